@@ -10,16 +10,19 @@
 #include <exception>
 #include <memory>
 #include <optional>
+#include <stop_token>
 #include <utility>
 
 #include <CLI/CLI.hpp>
 
 #include "command_line/wrong_use.hpp"
+#include "rules/text/names.hpp"
 #include "service/daemon.hpp"
 #include "service/log/event.hpp"
 #include "service/log/journal.hpp"
 #include "service/log/log.hpp"
 #include "service/log/log_sink.hpp"
+#include "service/models/preparation.hpp"
 #include "shm/descriptor_limit.hpp"
 #include "wire/rendezvous.hpp"
 
@@ -38,6 +41,7 @@ Example:
 It runs in the foreground, needs no configuration and no privileges, and logs to standard error;
 under systemd to the journal, where journalctl ARBITER_PORT=/Arm/pos:i shows what is about one port.
 Files must be regular ones. Warnings about them are logged; with --strict they refuse the files.
+With --check it says what it finds in the files and ends: before you start it, or reload.
 SIGHUP and `arbiter reload` read all again; a bad one changes nothing.
 SIGTERM, SIGINT and `arbiter stop` stop it. Without --policy every user may open ports and observe,
 and only root and the daemon's own user may reload, switch and stop.
@@ -47,7 +51,8 @@ models have errors, it keeps the model in force.
 It listens in the first of these that it can use: $RUNTIME_DIRECTORY, $XDG_RUNTIME_DIR/arbiter,
 /run/arbiter, arbiter-UID in the temporary directory.
 
-Exit codes: 0 stopped by a signal or by `arbiter stop`; 1 the files have errors, or it cannot serve;
+Exit codes: 0 stopped by a signal or by `arbiter stop`, or --check finds no error; 1 the files have
+errors, or it cannot serve;
 2 wrong use)";
 
 arbiter::shm::FileDescriptor catch_signals() {
@@ -87,6 +92,24 @@ class Log {
   ~Log() { log::shutdown(); }
 };
 
+// What a daemon with these options would say of its files.
+int check(const arbiter::service::DaemonOptions& options) {
+  using namespace arbiter::service;
+  const Gate gate(options.policy);
+  StatusLine progress(options.instance);
+  const Reading reading = read_files(
+      options.models, gate, {options.steps, progress.watch(), options.is_strict}, std::stop_token{});
+  if (reading.findings.has_errors()) {
+    log::error("a daemon would not start with these files{}",
+               options.is_strict ? "; --strict treats warnings as errors" : "");
+    return 1;
+  }
+  log::info("a daemon can start with these files: {}, {}",
+            arbiter::rules::counted(reading.models.size(), "model"),
+            options.policy ? "the policy " + *options.policy : "no policy");
+  return 0;
+}
+
 int serve(const arbiter::service::DaemonOptions& options, const std::string& instance,
           const arbiter::shm::FileDescriptor& signals) {
   arbiter::shm::raise_descriptor_limit();  // components and sources take a few each
@@ -116,6 +139,7 @@ int run(int argc, char** argv) {
   std::string instance;
   std::string level = "info";
   double effort = 1;
+  bool only_checks = false;
   app.add_option("--model", models,
                  "Model file; several files with the same NAME, or without one, form one model. "
                  "The first model comes into force; `arbiter switch` goes to the others")
@@ -131,6 +155,8 @@ int run(int argc, char** argv) {
   app.add_flag(
       "--strict", options.is_strict,
       "Treat warnings as errors: refuse files that have any, at the start and at a reload");
+  app.add_flag("--check", only_checks,
+               "Read and prove the files, say what is wrong with them, and end");
   app.add_option(
          "--instance", instance,
          "Name of this daemon; by default $ARBITER_INSTANCE, or \"default\" if that is not set")
@@ -159,13 +185,15 @@ int run(int argc, char** argv) {
     return app.exit(error) == 0 ? 0 : 2;
   }
   keep_files_from_others();
-  const auto signals = catch_signals();  // before there are threads: they inherit what is blocked
+  // Before there are threads: they inherit what is blocked.
+  const auto signals = only_checks ? arbiter::shm::FileDescriptor() : catch_signals();
   const Log logging(level);
   if (!policy.empty()) options.policy = policy;
   options.steps = arbiter::rules::Budget::steps_of(effort);
   try {
     options.models = arbiter::service::named_files(models, applications);
     options.instance = arbiter::wire::instance_name(instance);
+    if (only_checks) return check(options);
     options.directory = arbiter::wire::daemon_directory();
     options.stop_descriptor = signals.get();
     return serve(options, options.instance, signals);

@@ -12,6 +12,7 @@
 
 #include "service/log/log.hpp"
 #include "service/models/comparison.hpp"
+#include "service/policy/unmatched.hpp"
 
 namespace arbiter::service {
 namespace {
@@ -20,6 +21,20 @@ constexpr std::chrono::seconds kEvery{1};
 constexpr std::chrono::seconds kEveryInLog{2};
 // Longer than reading and extracting take, during which nothing is told.
 constexpr int kAtMost = 30;
+
+// That each pattern matches a port of one of the models.
+void check_patterns(const Policy& policy, const std::vector<ModelPointer>& models,
+                    Findings& findings) {
+  NamedPorts ports;
+  for (const ModelPointer& model : models) {
+    const rules::CompiledModel& compiled = model->compiled;
+    ports.outputs.insert(ports.outputs.end(), compiled.sources.begin(), compiled.sources.end());
+    for (const rules::CompiledPort& port : compiled.ports) ports.inputs.push_back(port.port);
+  }
+  rules::Diagnostics unmatched;
+  find_unmatched(policy, std::move(ports), unmatched);
+  if (!unmatched.items().empty()) findings.add("the policy", std::move(unmatched));
+}
 
 }  // namespace
 
@@ -30,6 +45,10 @@ Reading read_files(const std::vector<NamedFiles>& files, const Gate& gate, const
   reading.policy = gate.read(reading.findings);
   if (reading.findings.has_errors()) reading.policy.reset();  // what it warns of, --strict refuses
   reading.models = read_models(files, proving, stop, reading.findings);
+  if (reading.policy && !reading.findings.has_errors()) {
+    check_patterns(*reading.policy, reading.models, reading.findings);
+    if (reading.findings.has_errors()) reading.policy.reset();
+  }
   return reading;
 }
 

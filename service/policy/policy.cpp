@@ -12,9 +12,10 @@ constexpr std::uint16_t bit(Action action) {
   return static_cast<std::uint16_t>(1u << static_cast<unsigned>(action));
 }
 
-constexpr std::uint16_t kOnPorts = bit(Action::kOutput) | bit(Action::kInput) |
-                                   bit(Action::kDeactivate) | bit(Action::kReplay) |
-                                   bit(Action::kTap);
+constexpr std::uint16_t kOnOutputs =
+    bit(Action::kOutput) | bit(Action::kDeactivate) | bit(Action::kReplay) | bit(Action::kTap);
+constexpr std::uint16_t kOnInputs = bit(Action::kInput) | bit(Action::kTap);
+constexpr std::uint16_t kOnPorts = kOnOutputs | kOnInputs;
 
 bool is_about_a_port(Action action) { return (kOnPorts & bit(action)) != 0; }
 
@@ -33,8 +34,8 @@ bool glob_covers(std::string_view earlier, std::string_view later) {
 Policy::Policy(uid_t owner) : owner_(owner) {
   // Whoever may open an output port could end its activity by opening it, too.
   constexpr auto kUse = bit(Action::kOutput) | bit(Action::kInput) | bit(Action::kDeactivate);
-  rules_.push_back({true, {}, kUse, "*", 1, "allow everyone output,input,deactivate *"});
-  rules_.push_back({true, {}, bit(Action::kObserve), "*", 2, "allow everyone observe"});
+  rules_.push_back({true, {}, kUse, "*", 1, "allow everyone output,input,deactivate *", {}});
+  rules_.push_back({true, {}, bit(Action::kObserve), "*", 2, "allow everyone observe", {}});
 }
 
 bool Policy::Subject::includes(const Identity& who) const {
@@ -72,6 +73,16 @@ Policy::Verdict Policy::may(const Identity& who, Action action, std::string_view
             "arbiterd --policy takes another one"};
   }
   return {false, "no line of " + path_ + " allows it"};
+}
+
+std::vector<Policy::Pattern> Policy::patterns() const {
+  std::vector<Pattern> patterns;
+  for (const Rule& rule : rules_) {
+    if (!rule.where) continue;
+    patterns.push_back({rule.glob, (rule.actions & kOnOutputs) != 0,
+                        (rule.actions & kOnInputs) != 0, &*rule.where});
+  }
+  return patterns;
 }
 
 }  // namespace arbiter::service

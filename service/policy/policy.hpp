@@ -62,6 +62,14 @@ class Policy {
     std::string reason;  // names the line that decided
   };
 
+  // One of those that a line names, as the ports that its actions are about.
+  struct Pattern {
+    std::string_view glob;
+    bool is_on_outputs = false;
+    bool is_on_inputs = false;
+    const rules::Location* where = nullptr;
+  };
+
   // Bounds of a policy file, so that a question takes microseconds.
   static constexpr std::size_t kMaxRules = 1024;  // a line counts once for each of its globs
 
@@ -75,6 +83,8 @@ class Policy {
   [[nodiscard]] Verdict may(const Identity& who, Action action, std::string_view port = {}) const;
 
   [[nodiscard]] std::size_t size() const { return rules_.size(); }
+  // As long as this lives.
+  [[nodiscard]] std::vector<Pattern> patterns() const;
 
  private:
   friend class PolicyReader;
@@ -94,7 +104,8 @@ class Policy {
     std::uint16_t actions = 0;  // a bit for each
     std::string glob;           // of ports; what is about no port does not look at it
     std::uint32_t line = 1;
-    std::string text;  // as written, for messages
+    std::string text;                      // as written, for messages
+    std::optional<rules::Location> where;  // of the glob; nothing: there is none
 
     [[nodiscard]] bool covers(const Rule& later) const;
   };

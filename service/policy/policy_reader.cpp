@@ -146,7 +146,10 @@ class PolicyReader {
     rule.text = rules::collapse_blanks(file_.content().substr(begin, end - begin));
     if (rule.text.size() > kMaxShownText) rule.text = rule.text.substr(0, kMaxShownText) + "...";
     if (globs.empty()) return add(rule, effect, "*");
-    for (const std::string_view glob : globs) add(rule, glob, glob);
+    for (const std::string_view glob : globs) {
+      rule.where = file_.locate(file_.offset_of(glob.data()));
+      add(rule, glob, glob);
+    }
   }
 
   std::optional<Policy::Subject> read_subject() {

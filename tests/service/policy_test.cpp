@@ -6,6 +6,8 @@
 
 #include <sstream>
 
+#include "service/policy/unmatched.hpp"
+
 namespace arbiter::service {
 namespace {
 
@@ -204,6 +206,49 @@ TEST(Policy, WarnsOfALineThatNeverCounts) {
       "allow user alice output /Arm/x\ndeny everyone output /Arm/*\n"
       "allow user alice output /Leg*\nallow group 1000 stop\nallow user alice stop,reload\n"
       "allow user bob input /a*\ndeny user bob input /b*\nallow user bob input /*b");
+}
+
+// As those who wrote the policy find it: "no model has …", with what was meant.
+std::vector<std::string> unmatched(const std::string& text, NamedPorts ports) {
+  rules::Diagnostics diagnostics;
+  find_unmatched(good(text), std::move(ports), diagnostics);
+  std::vector<std::string> findings;
+  for (const auto& item : diagnostics.items()) {
+    EXPECT_EQ(item.severity, rules::Severity::kWarning);
+    EXPECT_EQ(item.code, "matches-nothing");
+    findings.push_back(std::to_string(item.where.line) + ":" + std::to_string(item.where.column) +
+                       ": " + item.message);
+  }
+  return findings;
+}
+
+TEST(Policy, WarnsOfAPatternThatMatchesNoPortOfAModel) {
+  const NamedPorts ports{{"/emergency:o", "/Arm/pos:o", "/Gaze:o"}, {"/Arm/pos:i", "/Gaze:i"}};
+  EXPECT_THAT(unmatched("allow user alice output /emergncy:o /Arm/*\n"
+                        "deny everyone output,deactivate /emergency:o",
+                        ports),
+              ElementsAre("1:25: no model has an output port that matches \"/emergncy:o\"; did you "
+                          "mean \"/emergency:o\"?"));
+  EXPECT_THAT(
+      unmatched("allow user alice input /Leg/*\nallow user alice tap *:i /L*:?", ports),
+      ElementsAre("1:24: no model has an input port that matches \"/Leg/*\"; correct or remove it; "
+                  "`arbiter rules MODEL` shows the ports of a model",
+                  "2:26: no model has a port that matches \"/L*:?\"; correct or remove it; "
+                  "`arbiter rules MODEL` shows the ports of a model"));
+  // Each kind of port has names of its own.
+  EXPECT_THAT(unmatched("allow user alice input /Gaze:o\nallow user alice replay /Gaze:i", ports),
+              ElementsAre(HasSubstr("an input port that matches \"/Gaze:o\"; did you mean "
+                                    "\"/Gaze:i\"?"),
+                          HasSubstr("an output port that matches \"/Gaze:i\"; did you mean "
+                                    "\"/Gaze:o\"?")));
+  EXPECT_THAT(unmatched("allow user alice input /Gaze:i *z*:i /*\nallow user alice tap /Gaze:o\n"
+                        "allow everyone observe\nallow everyone output,input *",
+                        ports),
+              IsEmpty());
+  EXPECT_THAT(
+      unmatched("allow user alice output /x\nallow user alice input /x", {{}, {"/Arm/pos:i"}}),
+      ElementsAre(HasSubstr("an input port")))
+      << "no model has an output port at all";
 }
 
 TEST(Policy, IsBounded) {

@@ -56,6 +56,36 @@ TEST(Start, IsRefusedForWarningsIfItIsStrict) {
   EXPECT_NE(log.find("--strict treats warnings as errors"), std::string::npos) << log;
 }
 
+// As a daemon would find them, but nobody is served.
+TEST(Start, ChecksItsFilesAndEndsIfThatIsAllItIsToDo) {
+  const TemporaryDirectory directory;
+  const auto model = directory.write(
+      "model.xml", "<behaviors><arbiter at='/in'><select from='/out'/></arbiter></behaviors>");
+  const auto policy = directory.write("policy", "allow everyone output /ouu\n");
+  const std::vector<std::string> files{"--check", "--model", model, "--policy", policy};
+  const auto result = arbiterd(files);
+  EXPECT_EQ(result.exit_code, 0);
+  EXPECT_NE(
+      result.err.find(policy + ":1:23: no model has an output port that matches \"/ouu\"; did you "
+                               "mean \"/out\"? [matches-nothing]"),
+      std::string::npos)
+      << result.err;
+  EXPECT_NE(result.err.find("a daemon can start with these files: 1 model, the policy " + policy),
+            std::string::npos)
+      << result.err;
+  std::vector<std::string> strict = files;
+  strict.push_back("--strict");
+  EXPECT_EQ(arbiterd(strict).exit_code, 1);
+  directory.write("policy", "alow everyone output /out\n");
+  const auto refused = arbiterd(files);
+  EXPECT_EQ(refused.exit_code, 1);
+  EXPECT_NE(refused.err.find(policy + ":1:1: \"alow\" is neither allow nor deny"),
+            std::string::npos)
+      << refused.err;
+  EXPECT_NE(refused.err.find("a daemon would not start with these files\n"), std::string::npos)
+      << refused.err;
+}
+
 TEST(Start, SaysWhichOptionItDoesNotKnowAndWhatWasMeant) {
   const auto result = arbiterd({"--modle", "x"});
   EXPECT_EQ(result.exit_code, 2);
