@@ -173,8 +173,9 @@ class Beat {
 }
 
 // The daemon does not know what this gateway has open: it begins anew, by the mapping that it has.
+// Where it cannot, this is called again, each second: `told` is the reason that was said last.
 void leave_lost_ports(const Setup& setup, const Arguments& arguments, const ProgramKind& kind,
-                      const MakeMiddleware& make, Reload& reload) {
+                      const MakeMiddleware& make, Reload& reload, std::string& told) {
   const std::string why =
       "the daemon does not know what this gateway has open, because the state of the last daemon "
       "is lost";
@@ -184,7 +185,8 @@ void leave_lost_ports(const Setup& setup, const Arguments& arguments, const Prog
     reload.begin_anew(setup_of(arguments, kind, setup.settings.mappings, make));
     say(Level::kWarning, why + "; the gateway begins anew");
   } catch (const std::exception& error) {  // as of a middleware that has no descriptor left
-    say(Level::kError, why + "; the gateway cannot begin anew: " + error.what());
+    if (std::exchange(told, error.what()) == error.what()) return;
+    say(Level::kError, why + "; the gateway cannot begin anew: " + told);
   }
 }
 
@@ -192,13 +194,14 @@ void leave_lost_ports(const Setup& setup, const Arguments& arguments, const Prog
 void serve(std::unique_ptr<Setup> setup, const Arguments& arguments, const ProgramKind& kind,
            const MakeMiddleware& make, Reload& reload) {
   Beat beat;
+  std::string told;
   for (; setup != nullptr; setup = reload.take()) {
     BridgeOptions options = setup->settings.bridge;
     options.on_round = [&] {
       beat();
       reload.look();
     };
-    options.on_turned_away = [&] { leave_lost_ports(*setup, arguments, kind, make, reload); };
+    options.on_turned_away = [&] { leave_lost_ports(*setup, arguments, kind, make, reload, told); };
     Bridge bridge(std::move(options), setup->settings.mappings, kind.kind, setup->bell,
                   *setup->middleware);
     try {
