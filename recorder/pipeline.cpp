@@ -14,11 +14,11 @@ using Why = WinnerChange::Why;
 // How long the thread sleeps where nothing comes.
 constexpr std::chrono::milliseconds kTick{100};
 
-// By which records are ordered. What is told about a source beside its arrivals keeps its place
-// behind them.
+// By which records are ordered. What a publisher says of its source counts for the last arrival:
+// where some were lost, one that is later than all that has been told.
 Nanoseconds key_of(const Record& record) {
   if (const auto* state = std::get_if<evidence::SourceState>(&record)) {
-    return state->why == evidence::SourceState::Why::page ? state->seen : 0;
+    return state->why == evidence::SourceState::Why::page ? state->seen : state->time;
   }
   if (std::holds_alternative<evidence::DestinationsChange>(record)) return 0;
   return evidence::time_of(record);

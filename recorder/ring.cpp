@@ -94,7 +94,9 @@ void Ring::forget_oldest() {
   sum_up(*record);
 }
 
+// The file begins when the last of what is summed up has happened: all of it was so then.
 void Ring::sum_up(const Record& record) {
+  base_time_ = std::max(base_time_, std::min(evidence::time_of(record), shm::monotonic_now()));
   const auto note = [this](SourceState state) {
     base_time_ = std::max(base_time_, state.seen);
     sources_.insert_or_assign(state.context->source, std::move(state));
@@ -121,7 +123,6 @@ void Ring::sum_up(const Record& record) {
     if (known != sources_.end()) known->second.context = change->context;
   } else if (const auto* model = std::get_if<evidence::ModelChange>(&record)) {
     model_ = *model;
-    base_time_ = std::max(base_time_, model->time);
   } else if (const auto* port = std::get_if<PortChange>(&record)) {
     const std::pair key(port->is_input, port->port);
     const bool is_open =
@@ -132,8 +133,9 @@ void Ring::sum_up(const Record& record) {
       ports_.erase(key);
     }
   } else if (const auto* winner = std::get_if<evidence::WinnerChange>(&record)) {
-    winners_.insert_or_assign(winner->port, *winner).first->second.why =
-        evidence::WinnerChange::Why::start;
+    auto& kept = winners_.insert_or_assign(winner->port, *winner).first->second;
+    kept.why = evidence::WinnerChange::Why::start;
+    kept.by.clear();
     if (winner->winner.empty()) winners_.erase(winner->port);
   } else if (const auto* missed = std::get_if<evidence::Missed>(&record)) {
     if (missed->why == evidence::Missed::Why::refused) untapped_[missed->source] = *missed;

@@ -294,6 +294,24 @@ TEST_F(RingTest, BeginsWithTheStateOfAllThatHasLeft) {
   EXPECT_EQ(result.equal, run.decisions.size());
 }
 
+// Nobody wins from 1300 on; a file that began before would say so of the time before, too.
+TEST_F(RingTest, BeginsBehindTheLastChangeOfWinnerThatHasLeft) {
+  using Change = evidence::WinnerChange;
+  Incident incident;
+  incident.arrive("/high", 1100, 1105, Incident::Fate::accepted);
+  incident.add(Change{"/in", "/high", "", 1100, Change::Why::arrival, "/high", 1});
+  incident.add(Change{"/in", "", "/high", 1300, Change::Why::expiry, "/high", 1});
+  incident.add(Change{"/other", "/low", "", 1310, Change::Why::expiry, "/high", 1});
+  incident.arrive("/low", 2000, 2001, Incident::Fate::accepted);
+  recorder::Ring ring(options(100, 1 << 20));
+  const auto recorded = dump(ring, incident);
+  ASSERT_THAT(recorded.runs, SizeIs(1));
+  EXPECT_EQ(recorded.runs[0].start, 1310);
+  ASSERT_THAT(recorded.runs[0].winners, SizeIs(1));
+  EXPECT_EQ(recorded.runs[0].winners[0].winner, "/low");
+  EXPECT_EQ(recorded.runs[0].winners[0].by, "") << "what it began with, nobody has caused";
+}
+
 TEST_F(RingTest, ATimeInTheFutureForgetsNothing) {
   constexpr evidence::Nanoseconds kHour = 3600'000'000'000;
   recorder::Ring ring(options(kHour, 1 << 20));
@@ -337,6 +355,34 @@ TEST(TimeOrder, HoldsNothingBackForAClockThatIsWrong) {
   order.take_before(
       101, [&](const evidence::RecordPtr& record) { times.push_back(evidence::time_of(*record)); });
   EXPECT_EQ(times, (std::vector<evidence::Nanoseconds>{1'000'000, 50}));
+}
+
+// It is of a later time: until then others may have changed what is decided.
+TEST(TimeOrder, WhatStandsBehindAGapWaitsForItsTime) {
+  recorder::TimeOrder order;
+  const auto add = [&](auto record, const char* source, evidence::Nanoseconds time) {
+    auto context = std::make_shared<evidence::SourceContext>();
+    context->source = source;
+    record.context = std::move(context);
+    record.time = time;
+    order.add(std::make_shared<const evidence::Record>(std::move(record)), 1000);
+  };
+  evidence::SourceState state;
+  state.why = evidence::SourceState::Why::gap;
+  state.lost = 3;
+  state.seen = 150;
+  add(evidence::Arrival{}, "/fast", 50);
+  add(state, "/fast", 150);
+  add(evidence::Arrival{}, "/slow", 100);
+  add(evidence::Arrival{}, "/fast", 160);
+  std::vector<evidence::Nanoseconds> times;
+  const auto note = [&](const evidence::RecordPtr& record) {
+    times.push_back(evidence::time_of(*record));
+  };
+  order.take_before(150, note);
+  EXPECT_EQ(times, (std::vector<evidence::Nanoseconds>{50, 100}));
+  order.take_before(1000, note);
+  EXPECT_EQ(times, (std::vector<evidence::Nanoseconds>{50, 100, 150, 160}));
 }
 
 TEST_F(RingTest, IsBoundedByBytes) {
