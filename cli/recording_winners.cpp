@@ -168,6 +168,35 @@ ordered_json components_json(const std::vector<const evidence::PortChange*>& com
   return list;
 }
 
+// Who had the source open that went inactive, and died; null: nobody did.
+const evidence::PortChange* death_behind(const Reign& reign) {
+  const evidence::WinnerChange& change = reign.change;
+  const auto changes = reign.run->output_changes.find(change.by);
+  if (change.why != evidence::WinnerChange::Why::expiry ||
+      changes == reign.run->output_changes.end()) {
+    return nullptr;
+  }
+  const evidence::PortChange* last = nullptr;
+  for (const evidence::PortChange& each : changes->second) {
+    if (each.seen <= change.time) last = &each;
+  }
+  const bool has_died = last != nullptr && last->what == evidence::PortChange::What::died;
+  return has_died ? last : nullptr;
+}
+
+std::string death_text(const Reign& reign) {
+  const evidence::PortChange* death = death_behind(reign);
+  if (death == nullptr) return "";
+  return "; " + shm::printable(watch::process_text(*death)) + " had died " +
+         seconds_text(reign.change.time - death->seen) + " before";
+}
+
+ordered_json death_json(const Reign& reign) {
+  const evidence::PortChange* death = death_behind(reign);
+  if (death == nullptr) return nullptr;
+  return {{"node", death->node}, {"pid", death->pid}, {"at_ns", death->seen}};
+}
+
 std::string cause_text(const evidence::WinnerChange& change) {
   const std::string by = shm::printable(change.by);
   switch (change.why) {
@@ -247,6 +276,7 @@ int show_winners(const RecordedWinners& options) {
            {"components", components_json(components.of(reign))},
            {"why", evidence::name_of(change.why)},
            {"by", change.by},
+           {"died", death_json(reign)},
            {"generation", change.generation}});
     }
     std::cout << list.dump(2, ' ', false, ordered_json::error_handler_t::replace) << '\n';
@@ -258,7 +288,7 @@ int show_winners(const RecordedWinners& options) {
     out << clock_text(change.time + offset) << "  " << shm::printable(change.port) << "  "
         << (change.winner.empty() ? "idle" : shm::printable(change.winner))
         << components_text(components.of(reign)) << "  " << length_text(reign) << ": "
-        << cause_text(change) << '\n';
+        << cause_text(change) << death_text(reign) << '\n';
   }
   if (reigns.empty()) out << nobody_text(options);
   std::cout << out.str();
@@ -279,7 +309,7 @@ void add_recorded_winners(CLI::App& parent, int& exit_code) {
       ->type_name("PATTERN");
   verb->add_flag("--json", options->json,
                  "A list of {from, from_ns, to_ns, cut_off, port, winner, components, why, by, "
-                 "generation}");
+                 "died, generation}");
   verb->footer(
       "Example:\n  arbiter recording winners incident.mcap --at 14:03:07\n\n"
       "Exit codes: 0 shown; 1 a file that `arbiter record` has not made; 2 wrong use, a time that "

@@ -197,6 +197,11 @@ TEST(RecordedWinners, SaysWhoseTheWinnerWas) {
             nlohmann::json::parse(R"([{"node": "nav", "pid": 11, "host": null}])"));
   EXPECT_EQ(found[1]["components"][0]["host"], "base");
   EXPECT_EQ(found[3]["components"], nlohmann::json::array());
+  EXPECT_EQ(found[2]["died"], nullptr);
+  EXPECT_EQ(found[3]["died"],
+            nlohmann::json::parse(R"({"node": "nav", "pid": 11, "at_ns": 3000000000})"));
+  EXPECT_THAT(arbiter({"recording", "winners", file, "--at", "1970-01-01 00:00:05.500"}).out,
+              testing::EndsWith(": /low went inactive; nav (pid 11) had died 2.000 s before\n"));
 }
 
 TEST(RecordedWinners, SaysThatNobodyHasWon) {
