@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <numeric>
+#include <tuple>
 
 #include "shm/limits.hpp"
 #include "shm/utf8.hpp"
@@ -43,17 +44,27 @@ std::size_t count_edits(std::string_view a, std::string_view b) {
   return rows[a.size() % 3][b.size()];
 }
 
-bool is_equal_but_for_case(std::string_view a, std::string_view b) {
-  const auto small = [](char each) { return each >= 'A' && each <= 'Z' ? char(each + 32) : each; };
-  return std::equal(a.begin(), a.end(), b.begin(), b.end(),
-                    [&](char x, char y) { return small(x) == small(y); });
-}
+constexpr std::size_t distance(std::size_t a, std::size_t b) { return a < b ? b - a : a - b; }
 
-// Without what most names of ports have: "/" and ":o".
-std::size_t own_length(std::string_view name) {
-  if (!name.starts_with('/')) return name.size();
-  const bool has_direction = name.size() > 3 && name[name.size() - 2] == ':';
-  return name.size() - (has_direction ? 3 : 1);
+constexpr std::size_t kMostAside = 3;  // "/" and ":o"
+
+// A name as it is compared: of a port's, what most others have as well stands aside.
+struct Compared {
+  std::string own;             // in small letters
+  std::string_view direction;  // "o" of "/Face/pos:o"
+};
+
+Compared compared(std::string_view name) {
+  Compared result;
+  if (name.starts_with('/')) {
+    name.remove_prefix(1);
+    if (name.size() > 2 && name[name.size() - 2] == ':') {
+      result.direction = name.substr(name.size() - 1);
+      name.remove_suffix(2);
+    }
+  }
+  for (const char each : name) result.own += each >= 'A' && each <= 'Z' ? char(each + 32) : each;
+  return result;
 }
 
 }  // namespace
@@ -154,19 +165,22 @@ std::optional<NameProblem> find_problem_in_behaviour(std::string_view name) {
 std::optional<std::string> find_similar(std::string_view name,
                                         const std::vector<std::string_view>& candidates) {
   if (name.empty() || name.size() > kMaxComparedLength) return {};
-  std::optional<std::string> best;
+  const Compared typed = compared(name);
   // A short name is within two edits of anything; at least half of it must be right.
-  std::size_t fewest = std::min(kMaxEdits, own_length(name) / 2) + 1;
+  const std::size_t most = std::min(kMaxEdits, typed.own.size() / 2);
+  std::optional<std::string> best;
+  std::tuple<std::size_t, bool, std::size_t> least;  // edits; another direction, another case
   for (const std::string_view candidate : candidates) {
-    if (is_equal_but_for_case(name, candidate)) return std::string(candidate);
-    const std::size_t shorter = std::min(name.size(), candidate.size());
-    const std::size_t longer = std::max(name.size(), candidate.size());
-    if (longer > kMaxComparedLength || longer - shorter >= fewest) continue;
-    const std::size_t edits = count_edits(name, candidate);
-    if (edits < fewest) {
-      fewest = edits;
-      best = std::string(candidate);
-    }
+    if (candidate.size() > kMaxComparedLength) continue;
+    if (distance(name.size(), candidate.size()) > most + kMostAside) continue;
+    const Compared other = compared(candidate);
+    if (distance(typed.own.size(), other.own.size()) > most) continue;
+    const std::size_t edits = count_edits(typed.own, other.own);
+    if (edits > most) continue;
+    const std::tuple now{edits, typed.direction != other.direction, count_edits(name, candidate)};
+    if (best && least <= now) continue;
+    least = now;
+    best = std::string(candidate);
   }
   return best;
 }

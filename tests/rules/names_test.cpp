@@ -81,7 +81,10 @@ TEST(Names, AMisspeltOneIsRecognised) {
   EXPECT_EQ(find_similar("B", {"A"}), std::nullopt) << "one letter is like any other";
   EXPECT_EQ(find_similar("/zz:o", {"/a:o"}), std::nullopt) << "of a port's name, the letters";
   EXPECT_EQ(find_similar("/P", {"/p"}), "/p");
-  EXPECT_EQ(find_similar("/faec:o", {"/face:o"}), "/face:o");
+  EXPECT_EQ(find_similar("/faec:o", {"/face:i", "/face:o"}), "/face:o");
+  EXPECT_EQ(find_similar("/a:i", {"/b:i", "/a:o"}), "/a:o") << "the other end";
+  EXPECT_EQ(find_similar("/CMD", {"/cmd:i"}), "/cmd:i");
+  EXPECT_EQ(find_similar("/stp:o", {"/stop:i"}), "/stop:i");
   EXPECT_EQ(find_similar("abcd", {"abxy", "abcx"}), "abcx") << "the nearest one";
   EXPECT_EQ(find_similar("wyh", {"who", "why"}), "why") << "two in the wrong order are one slip";
   EXPECT_EQ(find_similar("oLko Around", known), "Look Around");
