@@ -25,11 +25,14 @@ namespace wrong_use {
 struct Typed {
   const CLI::App* verb;
   std::string name;
+  std::vector<std::string> before;  // what stands in front of it, and nothing took
 };
 
 inline Typed typed_verb(const CLI::App& app) {
-  Typed typed{&app, app.get_name()};
+  Typed typed{&app, app.get_name(), {}};
   while (!typed.verb->get_subcommands().empty()) {
+    const auto left = typed.verb->remaining();
+    typed.before.insert(typed.before.end(), left.begin(), left.end());
     typed.verb = typed.verb->get_subcommands().front();
     typed.name += ' ' + typed.verb->get_name();
   }
@@ -53,42 +56,62 @@ inline bool has_option(const CLI::App& verb, const std::string& option) {
   return std::find(names.begin(), names.end(), option) != names.end();
 }
 
-inline std::string option_in(const std::string& word) { return word.substr(0, word.find('=')); }
+inline bool is_given(const CLI::App& verb, const std::string& option) {
+  const CLI::Option* const found = verb.get_option_no_throw(option);
+  return found != nullptr && found->count() > 0;
+}
+
+// Behind "--" there are none.
+inline std::vector<std::string> options_in(const std::vector<std::string>& words) {
+  std::vector<std::string> options;
+  for (const std::string& word : words) {
+    if (word == "--") break;
+    if (word.starts_with('-')) options.push_back(word.substr(0, word.find('=')));
+  }
+  return options;
+}
+
+inline std::vector<std::string> words_in(const std::vector<std::string>& words) {
+  std::vector<std::string> plain;
+  bool may_be_options = true;
+  for (const std::string& word : words) {
+    if (word == "--") may_be_options = false;
+    if (word != "--" && !(may_be_options && word.starts_with('-'))) plain.push_back(word);
+  }
+  return plain;
+}
 
 inline std::string suggestion(const std::string& word, const std::vector<std::string>& known) {
   const auto similar = rules::find_similar(word, {known.begin(), known.end()});
   return similar ? "; did you mean " + rules::quote(*similar) + '?' : "";
 }
 
-// Empty: there are none.
-inline std::string text_of_options(const CLI::App& verb, const std::string& name) {
-  std::string text;
-  for (const std::string& word : verb.remaining()) {
-    if (!word.starts_with('-')) continue;
-    const std::string option = option_in(word);
-    text += (text.empty() ? "" : "\n") + name + " has no option " + rules::quote(option) +
-            suggestion(option, options_of(verb));
-  }
-  return text;
+inline std::string text_of_option(const CLI::App& verb, const std::string& name,
+                                  const std::string& option) {
+  return name + " has no option " + rules::quote(option) + suggestion(option, options_of(verb));
 }
 
-// Of an option in front of the verb that has it: `arbiter --instance x status`. Empty: there is
-// none.
-inline std::string text_of_early_options(const CLI::App& app) {
-  const Typed typed = typed_verb(app);
+// Of options in front of the verb that has them: `arbiter --instance x status`; or that no verb
+// has. Empty: there is none.
+inline std::string text_of_early_options(const CLI::App& app, const Typed& typed) {
+  const bool is_typed = typed.verb != &app;
+  const std::vector<std::string> words = is_typed ? typed.before : app.remaining();
   const auto verbs = verbs_of(app);
-  for (const std::string& word : app.remaining()) {
-    const std::string option = option_in(word);
-    if (!word.starts_with('-') || has_option(app, option)) continue;
-    const bool is_typed = typed.verb != &app;
+  for (const std::string& option : options_in(words)) {
+    if (has_option(app, option)) continue;
     const bool is_known =
         is_typed ? has_option(*typed.verb, option)
                  : std::any_of(verbs.begin(), verbs.end(),
                                [&](const CLI::App* each) { return has_option(*each, option); });
-    if (!is_known) continue;
+    if (!is_known && !is_typed) continue;
+    if (!is_known) return text_of_option(*typed.verb, typed.name, option);
     std::string line = is_typed ? typed.name : app.get_name() + " VERB";
-    for (const std::string& each : app.remaining()) line += ' ' + each;
-    return "the options of a verb go after it; write: " + line;
+    for (const std::string& each : words) line += ' ' + shell_word(each);
+    const auto options = typed.verb->get_options();
+    const bool has_others = std::any_of(options.begin(), options.end(),
+                                        [](const CLI::Option* each) { return each->count() > 0; });
+    return "the options of a verb go after it; write: " + line +
+           (is_typed && has_others ? " ..." : "");
   }
   return {};
 }
@@ -103,21 +126,29 @@ inline bool takes_words(const CLI::App& verb) {
 // of options. `missing` is one that must be there; empty: there is none such.
 inline std::string meant(const CLI::App& verb, const std::vector<std::string>& words,
                          const std::string& missing) {
+  const auto as = [](const std::string& option, const std::string& value) {
+    return "; did you mean " + option + ' ' + shell_word(value) + '?';
+  };
+  const auto may_be = [&](const std::string& option) {
+    return has_option(verb, option) && !is_given(verb, option);
+  };
   const bool takes_others = takes_words(verb);
+  std::string all;
   for (const std::string& word : words) {
-    std::string option = takes_others ? "" : missing;
-    if (word.ends_with(".mcap") && has_option(verb, "--recording")) option = "--recording";
-    if (word.ends_with(".csv") && has_option(verb, "--trace")) option = "--trace";
+    all += (all.empty() ? "" : " ") + word;
+    if (word.ends_with(".mcap") && may_be("--recording")) return as("--recording", word);
+    if (word.ends_with(".mcap") && missing == "--output") return as(missing, word);
+    const bool has_rest = !takes_others || words.size() > 1;
+    if (word.ends_with(".csv") && has_rest && may_be("--trace")) return as("--trace", word);
     // A model is a plain argument of some programs, and not of others.
-    const bool is_model = word.ends_with(".xml") && !takes_others;
-    if (is_model && has_option(verb, "--model")) option = "--model";
-    if (!option.empty()) return "; did you mean " + option + ' ' + shell_word(word) + '?';
+    if (word.ends_with(".xml") && !takes_others && may_be("--model")) return as("--model", word);
   }
-  return {};
+  const bool is_statement = all.find('/') != std::string::npos;
+  return missing == "--until" && is_statement ? as(missing, all) : "";
 }
 
-inline std::string text_of_words(const CLI::App& verb, const std::string& name) {
-  const std::vector<std::string> words = verb.remaining();
+inline std::string text_of_words(const CLI::App& verb, const std::string& name,
+                                 const std::vector<std::string>& words) {
   std::vector<std::string> quoted;
   quoted.reserve(words.size());
   for (const std::string& word : words) quoted.push_back(rules::quote(word));
@@ -127,19 +158,16 @@ inline std::string text_of_words(const CLI::App& verb, const std::string& name) 
 inline std::string text_of_missing_verb(const CLI::App& verb, const std::string& name) {
   std::vector<std::string> names;
   for (const CLI::App* each : verbs_of(verb)) names.push_back(each->get_name());
-  const std::vector<std::string> words = verb.remaining();
-  const auto word = std::find_if(words.begin(), words.end(),
-                                 [](const std::string& each) { return !each.starts_with('-'); });
-  if (word == words.end()) {
-    return name + " needs a verb: " + rules::enumerate(names);
-  }
-  return name + " has no verb " + rules::quote(*word) +
-         rules::advise(*word, {names.begin(), names.end()}, "it has " + rules::enumerate(names));
+  const std::vector<std::string> words = words_in(verb.remaining());
+  if (words.empty()) return name + " needs a verb: " + rules::enumerate(names);
+  return name + " has no verb " + rules::quote(words.front()) +
+         rules::advise(words.front(), {names.begin(), names.end()},
+                       "it has " + rules::enumerate(names));
 }
 
 // `missing`: as CLI11 says it, "--until is required".
 inline std::string text_of_missing(const CLI::App& verb, const std::string& missing) {
-  std::vector<std::string> words = verb.remaining();
+  std::vector<std::string> words = words_in(verb.remaining());
   for (const CLI::Option* option : verb.get_options()) {
     if (!option->get_positional()) continue;
     const auto taken = option->results();
@@ -158,20 +186,23 @@ inline std::string example_of(const CLI::App& verb) {
   const std::size_t begin = help.find("\n  ", heading);
   if (begin == std::string::npos) return {};
   const std::string line = help.substr(begin + 3, help.find('\n', begin + 3) - begin - 3);
-  return "; for example: " + line;
+  return "; for example: " + std::string(rules::trim(line.substr(0, line.find("  #"))));
 }
 
-inline std::string text_of(const CLI::Error& error, const CLI::App& verb, const std::string& name) {
+inline std::string text_of(const CLI::Error& error, const Typed& typed,
+                           const std::string& program) {
   const auto is = [&](CLI::ExitCodes code) {
     return error.get_exit_code() == static_cast<int>(code);
   };
-  const bool has_words = !verb.remaining().empty();
+  const CLI::App& verb = *typed.verb;
   const bool lacks_verb = verb.get_require_subcommand_min() > 0 && verb.get_subcommands().empty();
   std::string text = error.what();
-  if (is(CLI::ExitCodes::ExtrasError) && has_words) {
-    text = text_of_words(verb, name);
+  if (is(CLI::ExitCodes::ExtrasError) && !verb.remaining().empty()) {
+    text = text_of_words(verb, typed.name, words_in(verb.remaining()));
+  } else if (is(CLI::ExitCodes::ExtrasError) && !words_in(typed.before).empty()) {
+    return text_of_words(verb, program, words_in(typed.before));
   } else if (is(CLI::ExitCodes::RequiredError)) {
-    if (lacks_verb) return text_of_missing_verb(verb, name);
+    if (lacks_verb) return text_of_missing_verb(verb, typed.name);
     text = text_of_missing(verb, text);
   } else {
     return text;
@@ -179,18 +210,35 @@ inline std::string text_of(const CLI::Error& error, const CLI::App& verb, const 
   return text.ends_with('?') ? text : text + example_of(verb);
 }
 
+inline std::vector<std::string> lines_of(const CLI::App& app, const Typed& typed,
+                                         const CLI::Error& error) {
+  const std::string early = text_of_early_options(app, typed);
+  if (!early.empty()) return {early};
+  const auto left = typed.verb->remaining();
+  const bool may_be_verb = typed.verb != &app && typed.verb->get_require_subcommand_min() > 0;
+  if (may_be_verb && !words_in(left).empty())
+    return {text_of_missing_verb(*typed.verb, typed.name)};
+  // What stands behind an unknown option is probably its value, and what is missing may be meant by
+  // it.
+  std::vector<std::string> lines;
+  for (const std::string& option : options_in(left)) {
+    lines.push_back(text_of_option(*typed.verb, typed.name, option));
+  }
+  if (lines.empty()) lines.push_back(text_of(error, typed, app.get_name()));
+  return lines;
+}
+
 }  // namespace wrong_use
 
 // With its end of line, made printable: what was typed may hold anything. As
 // CLI::App::failure_message() takes it.
 [[nodiscard]] inline std::string wrong_use_text(const CLI::App* app, const CLI::Error& error) {
-  const auto [verb, name] = wrong_use::typed_verb(*app);
-  // What stands behind an unknown option is probably its value, and what is missing may be meant by
-  // it.
-  std::string text = wrong_use::text_of_early_options(*app);
-  if (text.empty()) text = wrong_use::text_of_options(*verb, name);
-  if (text.empty()) text = wrong_use::text_of(error, *verb, name);
-  return shm::printable(text + "\nRun `" + name + " --help` for more information.\n", "\n\t");
+  const wrong_use::Typed typed = wrong_use::typed_verb(*app);
+  std::string text;
+  for (const std::string& line : wrong_use::lines_of(*app, typed, error)) {
+    text += shm::printable(line) + '\n';
+  }
+  return text + "Run `" + typed.name + " --help` for more information.\n";
 }
 
 }  // namespace arbiter::command_line

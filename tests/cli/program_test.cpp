@@ -136,6 +136,13 @@ TEST(Program, SaysWhichArgumentItDoesNotKnowAndWhatWasMeant) {
   EXPECT_THAT(error({"wait", "--util", "idle(/a)"}),
               HasSubstr("arbiter wait has no option \"--util\"; did you mean \"--until\"?"));
   EXPECT_THAT(error({"--hlep"}), HasSubstr("arbiter has no option \"--hlep\""));
+  EXPECT_THAT(error({"--josn", "status"}),
+              HasSubstr("arbiter status has no option \"--josn\"; did you mean \"--json\"?"));
+  EXPECT_THAT(error({"recording", "--json", "info", "x.mcap"}),
+              HasSubstr("go after it; write: arbiter recording info --json ..."));
+  EXPECT_THAT(error({"recording", "winers", "--json", "x.mcap"}),
+              HasSubstr("has no verb \"winers\"; did you mean \"winners\"?"));
+  EXPECT_THAT(error({"status", "x\nforged"}), HasSubstr("for \"x\\nforged\""));
   EXPECT_THAT(error({"wait"}), HasSubstr("--until is required"));
   EXPECT_THAT(error({"pub", "/a", "one", "two"}),
               HasSubstr("arbiter pub has no place for \"one\" and \"two\""));
@@ -152,6 +159,13 @@ TEST(Program, ShowsWhatWasMeantByAWordOrAnExample) {
   EXPECT_EQ(error({"simulate", "x.mcap"}), "--trace is required; did you mean --recording x.mcap?");
   EXPECT_EQ(error({"simulate", "m.xml", "t.csv"}),
             "--trace is required; did you mean --trace t.csv?");
+  EXPECT_EQ(error({"wait", "not", "/a:o"}),
+            "--until is required; did you mean --until 'not /a:o'?");
+  EXPECT_EQ(error({"record", "/a:o"}),
+            "--output is required; for example: arbiter record -o incident.mcap");
+  EXPECT_THAT(error({"simulate", "t.csv"}), HasSubstr("--trace is required; for example: arbiter"));
+  EXPECT_EQ(error({"switch", "a", "b"}),
+            "arbiter switch has no place for \"b\"; for example: arbiter switch");
   EXPECT_EQ(error({"why"}), "PORT is required; for example: arbiter why /Gaze/pos:i");
   EXPECT_EQ(error({"reload", "m.xml"}),
             "arbiter reload has no place for \"m.xml\"; for example: arbiter reload");
