@@ -37,7 +37,7 @@ using Findings = std::vector<Finding>;
 // The processes that a status names.
 [[nodiscard]] Findings examine_processes(const Machine& machine, const wire::Status& status);
 
-// Components that died with ports open that nobody has opened since.
+// Components that died, of whose ports the model wants one that nobody has open.
 [[nodiscard]] Findings examine_deaths(const wire::Status& status);
 
 // Sources that are inactive between their arrivals, because their publishers are slower than T. The

@@ -1,6 +1,6 @@
 // Doctor: components that died, and that nobody has started again.
-#include <algorithm>
 #include <set>
+#include <utility>
 
 #include "rules/text/names.hpp"
 #include "shm/clock.hpp"
@@ -11,18 +11,29 @@
 namespace arbiter::watch {
 namespace {
 
-bool is_open(const auto* port) { return port != nullptr && (port->open || port->away_pid); }
+bool is_left(const auto* port) {
+  return port != nullptr && port->mentioned && !port->open && !port->away_pid;
+}
 
-// The ports of those names that nobody has, and that no later death has told of.
-std::vector<std::string> left_by(const wire::Status& status, const wire::DeathStatus& death,
-                                 std::set<std::string>& told) {
+// What the model knows of those ports, and nobody has open; and no later death has told of.
+struct Left {
   std::vector<std::string> ports;
-  const auto add = [&](const std::string& port, bool is_open) {
-    if (!is_open && told.insert(port).second) ports.push_back(port);
-  };
-  for (const std::string& port : death.outputs) add(port, is_open(status.find_source(port)));
-  for (const std::string& port : death.inputs) add(port, is_open(status.find_input(port)));
-  return ports;
+  std::vector<std::string> active;  // those whose last arrival counts for ever
+};
+
+Left left_by(const wire::Status& status, const wire::DeathStatus& death,
+             std::set<std::string>& told) {
+  Left left;
+  for (const std::string& port : death.outputs) {
+    const wire::SourceStatus* source = status.find_source(port);
+    if (!is_left(source) || !told.insert(port).second) continue;
+    left.ports.push_back(port);
+    if (source->active && source->timeout == shm::kForever) left.active.push_back(port);
+  }
+  for (const std::string& port : death.inputs) {
+    if (is_left(status.find_input(port)) && told.insert(port).second) left.ports.push_back(port);
+  }
+  return left;
 }
 
 }  // namespace
@@ -31,14 +42,21 @@ Findings examine_deaths(const wire::Status& status) {
   Findings found;
   std::set<std::string> told;
   for (const wire::DeathStatus& death : status.deaths) {
-    const std::vector<std::string> ports = left_by(status, death, told);
+    const auto [ports, active] = left_by(status, death, told);
     if (ports.empty()) continue;
-    found.push_back({"dead-component",
-                     process_text(death) + " died " + span_text(shm::monotonic_now() - death.at) +
-                         " ago, and nobody has opened " + rules::enumerate(ports) + " since",
-                     "a source that nobody publishes is inactive once its T has passed, and at an "
-                     "input port that nobody has open nothing is taken",
-                     "start that component again"});
+    Finding finding{"dead-component",
+                    process_text(death) + " died " + span_text(shm::monotonic_now() - death.at) +
+                        " ago, and nobody has " + rules::enumerate(ports) + " open",
+                    "a source that nobody publishes is inactive once its T has passed, and at an "
+                    "input port that nobody has open nothing is taken",
+                    "start that component again"};
+    if (!active.empty()) {
+      finding.why = "the activity of " + rules::enumerate(active) +
+                    " lasts for ever: whom it commands gets nothing, and whom it inhibits stays "
+                    "kept out";
+      finding.mend += ", or: arbiter deactivate " + active.front();
+    }
+    found.push_back(std::move(finding));
   }
   return found;
 }
