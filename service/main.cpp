@@ -97,10 +97,11 @@ int check(const arbiter::service::DaemonOptions& options) {
   using namespace arbiter::service;
   const Gate gate(options.policy);
   StatusLine progress(options.instance);
-  const Reading reading = read_files(
-      options.models, gate, {options.steps, progress.watch(), options.is_strict}, std::stop_token{});
+  const Reading reading =
+      read_files(options.models, gate, {options.steps, progress.watch(), options.is_strict},
+                 std::stop_token{});
   if (reading.findings.has_errors()) {
-    log::error("a daemon would not start with these files{}",
+    log::error("the files have errors, listed above{}",
                options.is_strict ? "; --strict treats warnings as errors" : "");
     return 1;
   }

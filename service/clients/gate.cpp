@@ -6,6 +6,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "rules/text/names.hpp"
 #include "service/log/log.hpp"
 #include "service/policy/users.hpp"
 
@@ -59,7 +60,7 @@ std::optional<Policy> Gate::read(Findings& findings) const {
     const rules::TextFile text(
         *file_, rules::read_bytes(*file_, rules::kMaxFileBytes, rules::Accept::kRegularFile));
     Policy policy = Policy::parse(text, geteuid(), accounts_of_this_machine(), diagnostics);
-    findings.add("the policy", std::move(diagnostics));
+    findings.add(kOfPolicy, std::move(diagnostics));
     return policy;
   } catch (const std::runtime_error& error) {
     findings.add_failure(error.what());
@@ -69,7 +70,7 @@ std::optional<Policy> Gate::read(Findings& findings) const {
 
 void Gate::put_in_force(const Policy& policy) {
   policy_ = policy;
-  log::info("the policy of {} is in force, {} rules", *file_, policy_.size());
+  log::info("the policy of {} is in force, {}", *file_, rules::counted(policy_.size(), "rule"));
 }
 
 std::optional<std::string> Gate::why_not(const Client& client, Action action,

@@ -22,7 +22,7 @@ log::level::level_enum level_of(rules::Severity severity) {
                                                  : log::level::info;
 }
 
-void log_findings(const rules::Diagnostics& diagnostics) {
+void log_findings(const std::string& of, const rules::Diagnostics& diagnostics) {
   std::map<std::pair<rules::Severity, std::string>, std::size_t> logged;
   for (const rules::Diagnostic& finding : diagnostics.items()) {
     if (++logged[{finding.severity, finding.code}] > kMaxLogged) continue;
@@ -32,8 +32,8 @@ void log_findings(const rules::Diagnostics& diagnostics) {
   for (const auto& [kind, kept] : logged) {
     const std::size_t found = diagnostics.count(kind.first, kind.second);
     if (found <= kMaxLogged) continue;
-    log::log(level_of(kind.first), "{} more [{}]; arbiter check shows them", found - kMaxLogged,
-             kind.second);
+    log::log(level_of(kind.first), "{} more [{}]{}", found - kMaxLogged, kind.second,
+             of == kOfPolicy ? "" : "; arbiter check shows them");
   }
 }
 
@@ -45,7 +45,10 @@ bool is_error(const rules::Diagnostic& finding) {
 
 void Findings::add(std::string of, rules::Diagnostics diagnostics) {
   if (takes_warnings_for_errors_) diagnostics.make_warnings_errors();
-  log_findings(diagnostics);
+  log_findings(of, diagnostics);
+  const auto part =
+      std::find_if(parts_.begin(), parts_.end(), [&](const Part& each) { return each.of == of; });
+  if (part != parts_.end()) return part->diagnostics.add(std::move(diagnostics));
   parts_.push_back({std::move(of), std::move(diagnostics)});
 }
 

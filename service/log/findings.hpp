@@ -11,13 +11,16 @@
 
 namespace arbiter::service {
 
+inline constexpr const char* kOfPolicy = "the policy";
+
 // Of several files that are read together: a policy and models.
 class Findings {
  public:
   explicit Findings(bool takes_warnings_for_errors = false)
       : takes_warnings_for_errors_(takes_warnings_for_errors) {}
 
-  // Logs them too. `of` is what was read, as in a sentence: "the policy", "the model work".
+  // Logs them too. `of` is what was read, as in a sentence: kOfPolicy, "the model work". What was
+  // found of it before stays.
   void add(std::string of, rules::Diagnostics diagnostics);
   // It could not be read at all; the sentence says why.
   void add_failure(std::string why);

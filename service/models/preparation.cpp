@@ -22,9 +22,9 @@ constexpr std::chrono::seconds kEveryInLog{2};
 // Longer than reading and extracting take, during which nothing is told.
 constexpr int kAtMost = 30;
 
-// That each pattern matches a port of one of the models.
-void check_patterns(const Policy& policy, const std::vector<ModelPointer>& models,
-                    Findings& findings) {
+// Where patterns fit no port of any of the models.
+void note_patterns(const Policy& policy, const std::vector<ModelPointer>& models,
+                   Findings& findings) {
   NamedPorts ports;
   for (const ModelPointer& model : models) {
     const rules::CompiledModel& compiled = model->compiled;
@@ -33,7 +33,7 @@ void check_patterns(const Policy& policy, const std::vector<ModelPointer>& model
   }
   rules::Diagnostics unmatched;
   find_unmatched(policy, std::move(ports), unmatched);
-  if (!unmatched.items().empty()) findings.add("the policy", std::move(unmatched));
+  findings.add(kOfPolicy, std::move(unmatched));
 }
 
 }  // namespace
@@ -46,8 +46,7 @@ Reading read_files(const std::vector<NamedFiles>& files, const Gate& gate, const
   if (reading.findings.has_errors()) reading.policy.reset();  // what it warns of, --strict refuses
   reading.models = read_models(files, proving, stop, reading.findings);
   if (reading.policy && !reading.findings.has_errors()) {
-    check_patterns(*reading.policy, reading.models, reading.findings);
-    if (reading.findings.has_errors()) reading.policy.reset();
+    note_patterns(*reading.policy, reading.models, reading.findings);
   }
   return reading;
 }

@@ -1,4 +1,4 @@
-// Patterns of a policy that match no port of any model: most are misspelt, and then guard nothing.
+// Patterns of a policy that fit no port of any model: many are misspelt.
 #pragma once
 
 #include <string_view>
@@ -15,7 +15,8 @@ struct NamedPorts {
   std::vector<std::string_view> inputs;
 };
 
-// Warns of each, but of none that an action is about ports of which there are none at all.
+// Notes each: components may open ports that no model names. Of those on a kind of port of which
+// there is none at all, nothing is said. Takes a second at most, and then leaves the rest out.
 void find_unmatched(const Policy& policy, NamedPorts ports, rules::Diagnostics& diagnostics);
 
 }  // namespace arbiter::service
