@@ -144,6 +144,20 @@ bool is_letter_or_digit(char byte) {
                                advise(word, known, "names begin with '/'")};
 }
 
+// What to do about a character that no name has without quotes.
+std::string advice_on(char character) {
+  switch (character) {
+    case '*':
+      return "where a pattern is meant, write any(/Nav/*), all(/Nav/*) or none(/Nav/*)";
+    case '$':
+      return "a define is used as ${name}";
+    case ',':
+      return "write and, or or, between two conditions";
+    default:
+      return "remove it, or put the name that it belongs to in double quotes";
+  }
+}
+
 }  // namespace
 
 Token ConditionLexer::take() {
@@ -226,8 +240,7 @@ Token ConditionLexer::read_word() const {
     const std::string where =
         language_ == Language::kStatement ? "in a statement" : "in a condition";
     throw ConditionError{next_, quote(rest().substr(0, length)) + " has no meaning " + where +
-                                    "; remove it, or put the name that it belongs to in double "
-                                    "quotes"};
+                                    "; " + advice_on(rest().front())};
   }
   if (word.starts_with('/')) return {TokenKind::kPort, next_, word, word};
   // Nothing but letters makes a keyword, so that not/a is understood.

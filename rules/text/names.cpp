@@ -124,6 +124,12 @@ std::optional<NameProblem> find_problem_in_port(std::string_view name) {
                            std::string(name.substr(1, name.size() - 2)) + " without them",
                        0};
   }
+  if (name.starts_with('$')) {
+    return NameProblem{
+        "invalid-port-name",
+        "a port's name begins with '/', and a define is used as ${name}; correct " + quote(name),
+        0};
+  }
   if (!name.starts_with('/')) {
     return NameProblem{"invalid-port-name",
                        "a port's name begins with '/'; write " + quote("/" + std::string(name)) +
@@ -131,6 +137,13 @@ std::optional<NameProblem> find_problem_in_port(std::string_view name) {
                        0};
   }
   if (const auto fault = shm::find_fault_in_name(name)) {
+    const bool is_list =
+        shm::is_blank(name[fault->at]) && trim(name.substr(fault->at)).starts_with('/');
+    if (is_list) {
+      return NameProblem{"invalid-port-name",
+                         quote(name) + " are several names; write an element for each of them",
+                         fault->at};
+    }
     return NameProblem{
         "invalid-port-name",
         "the port's name " + quote(name) + " has " + fault->what + " in it; remove it", fault->at};

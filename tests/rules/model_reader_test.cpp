@@ -229,7 +229,7 @@ TEST(ModelReader, NamesThatAreNoneAreErrors) {
       {"<behavior name='B'>\n<config at=' p'>/s</config></behavior>",
        "2:14 error invalid-port-name", "write \"/p\" for \"p\""},
       {"<behavior name='B'>\n<config at='/p'>\n /s /t </config></behavior>",
-       "3:4 error invalid-port-name", "\"/s /t\" has white space in it"},
+       "3:4 error invalid-port-name", "\"/s /t\" are several names"},
       {"<behavior name='B'>\n<config at='/p'>s</config></behavior>", "2:17 error invalid-port-name",
        "write \"/s\" for \"s\""},
       {"<source port='/a&quot;b'/>", "1:17 error invalid-port-name", "a double quote"},

@@ -37,7 +37,9 @@ TEST(Names, OfPortsAreRefusedAtTheVeryByteThatIsWrong) {
   const std::vector<Case> cases{
       {"Face/pos:o", 0, "begins with '/'; write \"/Face/pos:o\""},
       {"/a b", 2, "white space"},
-      {"/a\n/b", 2, "white space"},
+      {"/a\n/b", 2, "are several names; write an element for each"},
+      {"/a, /b", 3, "are several names"},
+      {"$a", 0, "a define is used as ${name}"},
       {"/a\"b", 2, "a double quote"},
       {"/ä\xc2\xa0", 3, "an invisible character"},
       {"/a\xe2\x80\x8b", 2, "an invisible character"},
