@@ -5,9 +5,11 @@
 
 namespace arbiter::watch {
 
-// "gaze-control (pid 4711)": of a component, or a stranger.
+// "gaze-control (pid 4711)": of a component, or a stranger. The name of one that died before it
+// came back to this daemon is not known.
 [[nodiscard]] std::string process_text(const auto& process) {
-  return process.node + " (pid " + std::to_string(process.pid) + ")";
+  const std::string who = process.node.empty() ? "a component" : process.node;
+  return who + " (pid " + std::to_string(process.pid) + ")";
 }
 
 // Whether it lives and does not run: it was sent SIGSTOP, or is being debugged. Reads /proc.

@@ -51,6 +51,8 @@ TEST(WhyDaemon, OfAComponentThatHasNotComeBackSaysThatWhatIsConnectedGoesOn) {
   ChildProcess echo({ARBITER_PROGRAMS "/arbiter", "echo", "/arm", "--as-component"}, {}, {});
   await([&] { return daemon.connection("/rest", "/arm")["state"] == "connected"; });
   rest.publish(1);
+  // Then it waits for no answer to the opening any more, which it would give up once it is resumed.
+  await([&] { return daemon.connection("/rest", "/arm")["taken"] == 1; });
   echo.stop();
   daemon.kill();
   daemon.restart();
