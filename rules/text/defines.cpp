@@ -66,7 +66,8 @@ const std::string* Defines::look_up(const std::string& name, const Text& text, s
   if (later != announced_.end()) {
     const Location use = text.where(at);
     const Location& begin = later->second;
-    const bool is_inside = std::tie(begin.line, begin.column) < std::tie(use.line, use.column);
+    const bool is_inside = begin.file == use.file &&
+                           std::tie(begin.line, begin.column) < std::tie(use.line, use.column);
     diagnostics.error("unknown-define", use,
                       is_inside ? "${" + name + "} uses itself; write out what it stands for"
                                 : "${" + name + "} is used before it is defined, at " +
