@@ -38,7 +38,8 @@ TEST(Utf8, ANameThatWouldBreakALineOrMisleadItsReaderIsRefusedWithThePlace) {
 
 TEST(Utf8, APortsNameBeginsWithASlash) {
   for (const char* const name : {"/", "/Gaze/pos:i", "/顔/位置:o"}) EXPECT_TRUE(is_port_name(name));
-  for (const char* const name : {"", "a", "\"/a\"", "/a b"}) EXPECT_FALSE(is_port_name(name)) << name;
+  for (const char* const name : {"", "a", "\"/a\"", "/a b"})
+    EXPECT_FALSE(is_port_name(name)) << name;
   const std::string longest = "/" + std::string(kMaxNameLength - 1, 'a');
   EXPECT_TRUE(is_port_name(longest));
   EXPECT_FALSE(is_port_name(longest + "a"));
