@@ -6,7 +6,6 @@
 #include <stdexcept>
 #include <utility>
 
-#include "rules/text/names.hpp"
 #include "service/log/log.hpp"
 #include "service/policy/users.hpp"
 
@@ -70,7 +69,8 @@ std::optional<Policy> Gate::read(Findings& findings) const {
 
 void Gate::put_in_force(const Policy& policy) {
   policy_ = policy;
-  log::info("the policy of {} is in force, {}", *file_, rules::counted(policy_.size(), "rule"));
+  log::info("the policy of {} is in force, {} {}", *file_, policy_.size(),
+            policy_.size() == 1 ? "rule" : "rules");
 }
 
 std::optional<std::string> Gate::why_not(const Client& client, Action action,
