@@ -49,10 +49,13 @@ TEST(WhyDaemon, OfAComponentThatHasNotComeBackSaysThatWhatIsConnectedGoesOn) {
   Node node("test");
   auto rest = node.output_port<int>("/rest");
   ChildProcess echo({ARBITER_PROGRAMS "/arbiter", "echo", "/arm", "--as-component"}, {}, {});
-  await([&] { return daemon.connection("/rest", "/arm")["state"] == "connected"; });
-  rest.publish(1);
-  // Then it waits for no answer to the opening any more, which it would give up once it is resumed.
-  await([&] { return daemon.connection("/rest", "/arm")["taken"] == 1; });
+  // Once it has taken a sample it waits for no answer to the opening any more, which it would give
+  // up when it is resumed.
+  await([&] {
+    rest.publish(1);
+    const json connection = daemon.connection("/rest", "/arm");
+    return connection["state"] == "connected" && connection["taken"] > 0;
+  });
   echo.stop();
   daemon.kill();
   daemon.restart();
