@@ -342,7 +342,7 @@ void View::set_answer(const WhyAnswer& answer) {
   if (!is_wanted) return;
   std::vector<std::string> lines = answer.lines;
   if (!asked_->seen.empty()) {
-    lines.insert(lines.end(), {"", "What this screen has seen:"});
+    lines.insert(lines.end(), {"", "What this screen had seen when you asked:"});
     lines.insert(lines.end(), asked_->seen.begin(), asked_->seen.end());
   }
   overlay_.emplace(title_of(answer.question), std::move(lines));
