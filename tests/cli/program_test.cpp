@@ -91,16 +91,6 @@ TEST(Program, ExitsWith2WhereItIsUsedWrongly) {
   }
 }
 
-TEST(Program, SuggestsTheVerbThatWasMeant) {
-  const auto wrong = arbiter({"wyh", "/p"});
-  EXPECT_EQ(wrong.exit_code, 2);
-  EXPECT_EQ(wrong.err, "arbiter: there is no verb \"wyh\"; did you mean \"why\"?\n");
-  const auto other = arbiter({"explain", "/Arm/pos:i"});
-  EXPECT_EQ(other.exit_code, 2);
-  EXPECT_EQ(other.err, "arbiter: there is no verb \"explain\"; did you mean \"why\"?\n");
-  EXPECT_THAT(arbiter({"frobnicate"}).err, HasSubstr("`arbiter --help` lists"));
-}
-
 TEST(Program, HelpOfAVerbIsTheSameEitherWay) {
   const auto same = [](std::vector<std::string> words) {
     words.insert(words.begin(), "help");
@@ -114,84 +104,6 @@ TEST(Program, HelpOfAVerbIsTheSameEitherWay) {
   same({"why"});
   same({"recording", "winners"});
   EXPECT_THAT(arbiter({"help", "wyh"}).err, HasSubstr("did you mean \"why\"?"));
-}
-
-TEST(Program, SaysWhichArgumentItDoesNotKnowAndWhatWasMeant) {
-  const auto error = [](const std::vector<std::string>& arguments) {
-    const auto result = arbiter(arguments);
-    EXPECT_EQ(result.exit_code, 2);
-    return result.err;
-  };
-  EXPECT_EQ(error({"why", "/a", "--folow"}),
-            "arbiter why has no option \"--folow\"; did you mean \"--follow\"?\n"
-            "Run `arbiter why --help` for more information.\n");
-  EXPECT_THAT(error({"recording", "winers", "x.mcap"}),
-              HasSubstr("arbiter recording has no verb \"winers\"; did you mean \"winners\"?"));
-  EXPECT_THAT(
-      error({"recording"}),
-      HasSubstr("arbiter recording needs a verb: info, repair, export, winners and sample"));
-  EXPECT_THAT(error({"recording", "winners", "x.mcap", "--prot", "/a"}),
-              HasSubstr("arbiter recording winners has no option \"--prot\"; did you mean "
-                        "\"--port\"?"));
-  EXPECT_THAT(error({"wait", "--util", "idle(/a)"}),
-              HasSubstr("arbiter wait has no option \"--util\"; did you mean \"--until\"?"));
-  EXPECT_THAT(error({"--hlep"}), HasSubstr("arbiter has no option \"--hlep\""));
-  EXPECT_THAT(error({"--josn", "status"}),
-              HasSubstr("arbiter status has no option \"--josn\"; did you mean \"--json\"?"));
-  EXPECT_THAT(error({"recording", "--json", "info", "x.mcap"}),
-              HasSubstr("go after it; write: arbiter recording info --json ..."));
-  EXPECT_THAT(error({"recording", "winers", "--json", "x.mcap"}),
-              HasSubstr("has no verb \"winers\"; did you mean \"winners\"?"));
-  EXPECT_THAT(error({"status", "x\nforged"}), HasSubstr("for \"x\\nforged\""));
-  EXPECT_THAT(error({"wait"}), HasSubstr("--until is required"));
-  EXPECT_THAT(error({"pub", "/a", "one", "two"}),
-              HasSubstr("arbiter pub has no place for \"one\" and \"two\""));
-}
-
-TEST(Program, ShowsWhatWasMeantByAWordOrAnExample) {
-  const auto error = [](const std::vector<std::string>& arguments) {
-    const auto result = arbiter(arguments);
-    EXPECT_EQ(result.exit_code, 2);
-    return result.err.substr(0, result.err.find('\n'));
-  };
-  EXPECT_EQ(error({"wait", "idle(/a)"}), "--until is required; did you mean --until 'idle(/a)'?");
-  EXPECT_EQ(error({"record", "x.mcap"}), "--output is required; did you mean --output x.mcap?");
-  EXPECT_EQ(error({"simulate", "x.mcap"}), "--trace is required; did you mean --recording x.mcap?");
-  EXPECT_EQ(error({"simulate", "m.xml", "t.csv"}),
-            "--trace is required; did you mean --trace t.csv?");
-  EXPECT_EQ(error({"wait", "not", "/a:o"}),
-            "--until is required; did you mean --until 'not /a:o'?");
-  EXPECT_EQ(error({"record", "/a:o"}),
-            "--output is required; for example: arbiter record -o incident.mcap");
-  EXPECT_THAT(error({"simulate", "t.csv"}), HasSubstr("--trace is required; for example: arbiter"));
-  EXPECT_EQ(error({"switch", "a", "b"}),
-            "arbiter switch has no place for \"b\"; for example: arbiter switch");
-  EXPECT_EQ(error({"why"}), "PORT is required; for example: arbiter why /Gaze/pos:i");
-  EXPECT_EQ(error({"reload", "m.xml"}),
-            "arbiter reload has no place for \"m.xml\"; for example: arbiter reload");
-}
-
-TEST(Program, ShowsControlCharactersInsteadOfSendingThem) {
-  for (const auto& arguments :
-       std::vector<std::vector<std::string>>{{"\x1b[31mred"},
-                                             {"check", "\x1b[31mred"},
-                                             {"check", "m.xml", "--\x1b[31mred"},
-                                             {"check", "\xc2\x9b[31mred"},
-                                             {"status", "--instance", "\x1b[31mred"}}) {
-    const auto result = arbiter(arguments);
-    EXPECT_THAT(result.err, HasSubstr("[31mred"));
-    EXPECT_THAT(result.err, Not(HasSubstr("\x1b")));
-    EXPECT_THAT(result.err, Not(HasSubstr("\xc2\x9b")));
-  }
-}
-
-TEST(Program, TellsTheBoundsOfNumbersShortly) {
-  for (const auto& arguments : std::vector<std::vector<std::string>>{
-           {"rollback", "0"}, {"echo", "/p", "--count", "0"}, {"pub", "/p", "--count", "x"}}) {
-    const auto result = arbiter(arguments);
-    EXPECT_EQ(result.exit_code, 2);
-    EXPECT_THAT(result.err, HasSubstr("is not a whole number of at least 1\n"));
-  }
 }
 
 TEST(Program, ExitsWith2WhereAFileCannotBeOpened) {
@@ -298,20 +210,6 @@ TEST(Program, ProvesAModelWithTheSameEffortWhateverTheVerb) {
     EXPECT_THAT(result.err, HasSubstr("allow more steps with --effort [limit-exceeded]"))
         << arguments[0];
   }
-}
-
-TEST(Program, SaysThatOptionsGoAfterTheVerb) {
-  const auto error = [](const std::vector<std::string>& arguments) {
-    const auto result = arbiter(arguments);
-    EXPECT_EQ(result.exit_code, 2);
-    return result.err;
-  };
-  EXPECT_EQ(error({"--instance", "newcomer", "status"}),
-            "the options of a verb go after it; write: arbiter status --instance newcomer\n"
-            "Run `arbiter status --help` for more information.\n");
-  EXPECT_THAT(error({"--instance", "newcomer"}),
-              HasSubstr("write: arbiter VERB --instance newcomer\n"));
-  EXPECT_THAT(error({"--frob", "status"}), testing::Not(HasSubstr("go after it")));
 }
 
 TEST(Program, ExitsWith2WhereANameCannotBeOne) {
