@@ -52,8 +52,7 @@ inline std::vector<std::string> options_of(const CLI::App& verb) {
 }
 
 inline bool has_option(const CLI::App& verb, const std::string& option) {
-  const auto names = options_of(verb);
-  return std::find(names.begin(), names.end(), option) != names.end();
+  return verb.get_option_no_throw(option) != nullptr;
 }
 
 inline bool is_given(const CLI::App& verb, const std::string& option) {
@@ -155,6 +154,9 @@ inline std::string text_of_words(const CLI::App& verb, const std::string& name,
   return name + " has no place for " + rules::enumerate(quoted) + meant(verb, words, "");
 }
 
+// Of the verb that was typed last, which has none behind it.
+inline bool lacks_verb(const CLI::App& typed) { return typed.get_require_subcommand_min() > 0; }
+
 inline std::string text_of_missing_verb(const CLI::App& verb, const std::string& name) {
   std::vector<std::string> names;
   for (const CLI::App* each : verbs_of(verb)) names.push_back(each->get_name());
@@ -195,14 +197,13 @@ inline std::string text_of(const CLI::Error& error, const Typed& typed,
     return error.get_exit_code() == static_cast<int>(code);
   };
   const CLI::App& verb = *typed.verb;
-  const bool lacks_verb = verb.get_require_subcommand_min() > 0 && verb.get_subcommands().empty();
   std::string text = error.what();
   if (is(CLI::ExitCodes::ExtrasError) && !verb.remaining().empty()) {
     text = text_of_words(verb, typed.name, words_in(verb.remaining()));
   } else if (is(CLI::ExitCodes::ExtrasError) && !words_in(typed.before).empty()) {
     return text_of_words(verb, program, words_in(typed.before));
   } else if (is(CLI::ExitCodes::RequiredError)) {
-    if (lacks_verb) return text_of_missing_verb(verb, typed.name);
+    if (lacks_verb(verb)) return text_of_missing_verb(verb, typed.name);
     text = text_of_missing(verb, text);
   } else {
     return text;
@@ -215,9 +216,9 @@ inline std::vector<std::string> lines_of(const CLI::App& app, const Typed& typed
   const std::string early = text_of_early_options(app, typed);
   if (!early.empty()) return {early};
   const auto left = typed.verb->remaining();
-  const bool may_be_verb = typed.verb != &app && typed.verb->get_require_subcommand_min() > 0;
-  if (may_be_verb && !words_in(left).empty())
+  if (typed.verb != &app && lacks_verb(*typed.verb) && !words_in(left).empty()) {
     return {text_of_missing_verb(*typed.verb, typed.name)};
+  }
   // What stands behind an unknown option is probably its value, and what is missing may be meant by
   // it.
   std::vector<std::string> lines;
