@@ -12,14 +12,6 @@ namespace {
 
 constexpr std::string_view kForever = "forever";
 
-// "Forever", "for ever".
-bool is_meant_as_forever(std::string_view text) {
-  std::string small(text);
-  std::transform(small.begin(), small.end(), small.begin(),
-                 [](char each) { return each >= 'A' && each <= 'Z' ? char(each + 32) : each; });
-  return find_similar(small, {kForever}).has_value();
-}
-
 using Unit = std::pair<std::string_view, shm::Nanoseconds>;
 // The largest first.
 constexpr std::array<Unit, 4> kUnits{
@@ -81,7 +73,7 @@ ParsedDuration parse_duration(std::string_view text, const DurationWords& words)
   if (lacks_zero) return parse_duration("0" + std::string(text), words);
   const std::size_t digits = text.find_first_not_of("0123456789");
   if (text.empty() || digits == 0) {
-    const bool means_forever = words.takes_forever && is_meant_as_forever(text);
+    const bool means_forever = words.takes_forever && find_similar(text, {kForever});
     return refuse("is not a whole number with a unit",
                   means_forever ? "did you mean \"forever\"?" : words.advice);
   }
