@@ -94,7 +94,8 @@ void Ring::forget_oldest() {
   sum_up(*record);
 }
 
-// The file begins when the last of what is summed up has happened: all of it was so then.
+// The file begins when the last of what is summed up has happened, or was heard of: all of it was
+// so then.
 void Ring::sum_up(const Record& record) {
   base_time_ = std::max(base_time_, std::min(evidence::time_of(record), shm::monotonic_now()));
   const auto note = [this](SourceState state) {

@@ -52,8 +52,7 @@ It listens in the first of these that it can use: $RUNTIME_DIRECTORY, $XDG_RUNTI
 /run/arbiter, arbiter-UID in the temporary directory.
 
 Exit codes: 0 stopped by a signal or by `arbiter stop`, or --check finds no error; 1 the files have
-errors, or it cannot serve;
-2 wrong use)";
+errors, or it cannot serve; 2 wrong use)";
 
 arbiter::shm::FileDescriptor catch_signals() {
   sigset_t caught;

@@ -32,6 +32,7 @@ struct Case {
 // Without it tests would be named by addresses.
 void PrintTo(const Case& its, std::ostream* out) { *out << its.name; }
 
+// The phases of victim_main.cpp that open a tap.
 bool taps_survivor(const Case& its) {
   const std::string_view phase = its.phase;
   return phase == "open-tap" || phase == "close-tap" || phase == "take-events" ||
