@@ -27,6 +27,13 @@ void require_usable(const wire::Received& received) {
   }
 }
 
+bool hands_back(wire::MessageKind kind) {
+  using wire::MessageKind;
+  return kind == MessageKind::kHandBackPage || kind == MessageKind::kHandBackOutput ||
+         kind == MessageKind::kHandBackInput || kind == MessageKind::kHandBackLink ||
+         kind == MessageKind::kHandedBack;
+}
+
 // What is not said while components come back to a new daemon.
 bool is_question(wire::MessageKind kind) {
   using wire::MessageKind;
@@ -47,6 +54,7 @@ void Daemon::handle(Client& client, wire::Received& received) {
     return;
   }
   require_usable(received);
+  if (client.is_taken_anew && hands_back(message.kind)) return;
   if (client.node == 0 && message.kind != wire::MessageKind::kHello) {
     throw std::runtime_error("a client must say hello first");
   }
@@ -117,6 +125,9 @@ void Daemon::handle(Client& client, wire::Received& received) {
     case wire::MessageKind::kConnect:
       if (client.ports.count(message.port) == 0) throw std::runtime_error("the port is not open");
       connect(client, message.request, message.port);
+      break;
+    case wire::MessageKind::kNodeEnded:
+      takeover_.forget_ended(client, message.link);
       break;
     case wire::MessageKind::kStop:
       gate_.require(client, Action::kStop);
@@ -195,14 +206,15 @@ void Daemon::hello(Client& client, const wire::Received& received) {
   }
   if (message.name_view().empty()) throw std::runtime_error("a client must have a name");
   require_fine(message.name_view(), "the client's");
-  const bool returns = (message.flags & wire::kRejoins) != 0;
-  const NodeId former = takeover_.knows(received.descriptors[0]) ? message.link : 0;
-  client.charge = takeover_.make_room_for(client, former);
+  const bool is_known = takeover_.knows(received.descriptors[0]);
+  const bool rejoins = (message.flags & wire::kRejoins) != 0;
+  const bool returns = rejoins && (is_known || (message.flags & wire::kHasNoPorts) == 0);
+  client.charge = takeover_.make_room_for(client, returns && is_known ? message.link : 0);
   client.name = message.name_view();
   client.hello_request = message.request;
   client.has_service_thread = (message.flags & wire::kHasServiceThread) != 0;
   client.comes_back = (message.flags & wire::kComesBack) != 0;
-  client.former = returns ? 0 : former;
+  client.is_taken_anew = rejoins && !returns;
   if (returns) {
     takeover_.rejoin(client, received);
   } else if (serves()) {

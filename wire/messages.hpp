@@ -17,7 +17,8 @@
 //
 // A client that has lost its daemon looks for another, or the same, and says kHello with kRejoins;
 // it is answered kWelcome (or kRefused) and tells what it has: kHandBackPage…, for each port
-// kHandBackOutput or kHandBackInput with its kHandBackLink…, and then kHandedBack.
+// kHandBackOutput or kHandBackInput with its kHandBackLink…, and then kHandedBack. Of nodes that
+// end while there is no daemon the other nodes of their process tell the next one: kNodeEnded.
 #pragma once
 
 #include <sys/types.h>
@@ -35,14 +36,13 @@
 
 namespace arbiter::wire {
 
-inline constexpr std::uint32_t kWireVersion = 4;
+inline constexpr std::uint32_t kWireVersion = 5;
 
 enum class MessageKind : std::uint32_t {
   // From a client.
-  kHello = 1,  // name, flags (kHasServiceThread, kComesBack, kRejoins); value = kWireVersion; link:
-               // the node it was welcomed as before, or 0; if it rejoins, descriptors: board,
-               // registry. One that was here and does not rejoin has nothing left of what it was;
-               // descriptor: the board, of which the number is
+  kHello = 1,    // name, flags (kHasServiceThread, kComesBack, kRejoins, kHasNoPorts); value =
+                 // kWireVersion; link: the node it was welcomed as before, or 0; if it rejoins,
+                 // descriptors: board, registry
   kOpenOutput,   // name, type, flags (kYields); descriptor: its segment
   kOpenInput,    // name, type; descriptors: its segment, its bell
   kClosePort,    // port
@@ -69,10 +69,11 @@ enum class MessageKind : std::uint32_t {
   kOpenTap,  // name, flags (kTapsInput, kRejoins); descriptors: its segment, its bell. kOpened and
   // kConnected as for a port; it is closed as one. One that another daemon has opened asks
   // again
-  kTapped,    // answers kTap. port, peer; link, value: where the tap reads; descriptor: the events
-  kDescribe,  // port, text: what stands behind it, for the status; empty: nothing
-  kMay = 60,  // value: a user; text: its groups, numbers between blanks; name: an action that is
-              // about no port. kDone: the policy allows it; kRefused, text: why not
+  kTapped,     // answers kTap. port, peer; link, value: where the tap reads; descriptor: the events
+  kDescribe,   // port, text: what stands behind it, for the status; empty: nothing
+  kMay = 60,   // value: a user; text: its groups, numbers between blanks; name: an action that is
+               // about no port. kDone: the policy allows it; kRefused, text: why not
+  kNodeEnded,  // link: a node of this process that has ended, perhaps without being heard
 
   // From the daemon.
   kWelcome = 100,  // link: the node's number; peer: the daemon's clock, 0 if it does not say;
@@ -122,6 +123,7 @@ enum MessageFlag : std::uint32_t {
   kIsPrivileged = 256,   // the tap is root's, or of the daemon's own user
   kTellsActivity = 512,  // else the daemon does not know it
   kYields = 1024,        // the output port gives way to one of its name that does not
+  kHasNoPorts = 2048,    // who rejoins is a newcomer to a daemon that has other memory
 };
 
 struct Message {

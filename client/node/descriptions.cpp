@@ -44,7 +44,9 @@ void NodeCore::say_descriptions() noexcept {
     message.port = port;
     message.set_text(description.text);
     description.said_at = now;
-    description.is_said = wire::send_message(socket_->get(), message) == wire::SendResult::kSent;
+    // What follows may say something else: it does not wait in the outbox.
+    description.is_said =
+        outbox_.empty() && wire::send_message(socket_->get(), message) == wire::SendResult::kSent;
   }
 }
 

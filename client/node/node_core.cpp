@@ -74,6 +74,7 @@ NodeCore::NodeCore(std::string_view name, const NodeOptions& options)
 
 NodeCore::~NodeCore() {
   stop_service_thread();
+  remember_end();
   hang_up();
 }
 
@@ -87,6 +88,7 @@ void NodeCore::connect() {
   const std::string fault = wire::find_fault_in_clock(welcome.received.message, welcome.asked);
   if (!fault.empty()) throw Error(fault);
   socket_ = std::make_shared<const shm::FileDescriptor>(std::move(welcome.socket));
+  make_non_blocking(*socket_);
   auto& [board, registry] = welcome.received.descriptors;
   memory_ = std::make_shared<SharedMemory>(std::move(board), std::move(registry), service_bell_,
                                            residence());
@@ -166,8 +168,23 @@ std::shared_ptr<SharedMemory> NodeCore::memory() {
   return memory_;
 }
 
-void NodeCore::say(const wire::Message& message) noexcept {
-  if (socket_ != nullptr) static_cast<void>(wire::send_message(socket_->get(), message));
+void NodeCore::say(const wire::Message& message, Outbox::Descriptors descriptors) noexcept {
+  if (socket_ == nullptr) return;
+  const bool waited = !outbox_.empty();
+  if (!outbox_.send(socket_->get(), message, descriptors)) return lose_daemon();
+  if (!waited && !outbox_.empty()) heed_room(true);
+}
+
+void NodeCore::say_what_waits() noexcept {
+  if (socket_ == nullptr || outbox_.empty()) return;
+  if (!outbox_.flush(socket_->get())) return lose_daemon();
+  if (outbox_.empty()) heed_room(false);
+}
+
+void NodeCore::heed_room(bool is_wanted) const noexcept {
+  epoll_event event{};
+  event.events = EPOLLIN | (is_wanted ? EPOLLOUT : 0u);
+  epoll_ctl(epoll_.get(), EPOLL_CTL_MOD, socket_->get(), &event);
 }
 
 void NodeCore::say_closed(shm::PortInstance port) noexcept {
@@ -257,6 +274,7 @@ wire::Received NodeCore::converse(const wire::Message& question,
     }
     if (standing_ == Standing::kMember && reply.asked_in != conversation_) {
       reply.asked_in = conversation_;
+      say_who_has_ended();  // before a name is asked for that is kept for one of them
       // A port that another daemon has opened was handed back to this one: what is left is to be
       // connected.
       if (question.kind == wire::MessageKind::kOpenTap) reply.opened = 0;
@@ -266,8 +284,8 @@ wire::Received NodeCore::converse(const wire::Message& question,
         numbered.port = reply.opened;
         descriptors = {-1, -1};
       }
-      // If it cannot be sent the conversation is over, and the next one asks again.
-      static_cast<void>(wire::send_message(socket_->get(), numbered, descriptors));
+      // If the conversation is over after this, the next one asks again.
+      say(numbered, descriptors);
     }
     if (!said && Clock::now() - begin >= kQuietWait) {
       said = true;

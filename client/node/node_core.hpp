@@ -4,7 +4,7 @@
 //   notices.cpp       what the component should know
 //   service.cpp       what the daemon says, and the thread that hears it
 //   links.cpp         what it says of the ports at the other end
-//   rejoin.cpp        losing the daemon, and coming back to another
+//   rejoin.cpp        losing the daemon, and coming back to another; ending without one
 //   descriptions.cpp  what components say of their ports
 //   taps.cpp          taps that this node opens, and taps of its output ports
 //
@@ -32,6 +32,7 @@
 
 #include "client/input/input_core.hpp"
 #include "client/memory.hpp"
+#include "client/node/outbox.hpp"
 #include "client/output/output_core.hpp"
 #include "client/tap/tap_core.hpp"
 #include "shm/descendants.hpp"
@@ -171,19 +172,29 @@ class NodeCore : public std::enable_shared_from_this<NodeCore> {
 
   [[nodiscard]] bool watch_socket() const;
   void hang_up() const noexcept;
-  void lose_daemon();
-  void be_alone(Clock::duration look_again_in);
+  // Under mutex_: the conversation is over.
+  void lose_daemon() noexcept;
+  void be_alone(Clock::duration look_again_in) noexcept;
   void ring_timer_every(Clock::duration time) const;
   void rejoin();
-  [[nodiscard]] bool hand_back_memory(const shm::FileDescriptor& socket) const;
+  [[nodiscard]] bool hand_back_memory(const shm::FileDescriptor& socket, bool has_ports) const;
   [[nodiscard]] bool hand_back(const shm::FileDescriptor& socket,
                                const std::vector<PortAtHand>& ports) const;
   void be_welcomed(wire::Received& welcome);
   void be_turned_away(const wire::Message& refusal);
+  // Whether the daemon is there, and has read all that we have said.
+  [[nodiscard]] bool is_heard() const noexcept;
+  void remember_end() const noexcept;
+  // Under mutex_, as a member: of the nodes of this process.
+  void say_who_has_ended() noexcept;
 
   [[nodiscard]] Socket socket();
-  // Under mutex_. What is lost with the conversation, rejoining makes good.
-  void say(const wire::Message& message) noexcept;
+  // Under mutex_. Never waits for the daemon. What is lost with the conversation, rejoining makes
+  // good; it is over after this where that is the only way on.
+  void say(const wire::Message& message, Outbox::Descriptors descriptors = {-1, -1}) noexcept;
+  void say_what_waits() noexcept;
+  // Whether the loop is to hear of room in the socket, too.
+  void heed_room(bool is_wanted) const noexcept;
   void say_closed(shm::PortInstance port) noexcept;
   void forget_port(shm::PortInstance port);
   // `memory`: that which the question is about, if any. Throws Error, MemoryIsNew.
@@ -212,11 +223,12 @@ class NodeCore : public std::enable_shared_from_this<NodeCore> {
   std::condition_variable news_;  // an answer, or a change of standing
   std::mutex pump_mutex_;         // without a service thread: one caller at a time
   Socket socket_;                 // null while alone
+  Outbox outbox_;                 // of the conversation
   Standing standing_ = Standing::kMember;
   std::uint64_t conversation_ = 1;  // counts the daemons that have welcomed us
   std::uint64_t node_ = 0;          // our number among all nodes
   std::string turned_away_;         // why the last daemon did not take us back
-  bool is_anew_ = false;            // rejoining with nothing to hand back
+  bool has_no_ports_ = false;       // rejoining without any: other memory will do as well
   shm::Nanoseconds asked_ = 0;      // when we asked to rejoin
   bool has_told_of_clock_ = false;  // that the daemon's is another
   bool stopping_ = false;

@@ -4,7 +4,10 @@
 // is handed back the memory that the last one made, and told of each port and its links
 // (service/takeover/takeover.hpp).
 #include <fcntl.h>
+#include <linux/sockios.h>
+#include <poll.h>
 #include <sys/epoll.h>
+#include <sys/ioctl.h>
 #include <sys/timerfd.h>
 
 #include <algorithm>
@@ -12,6 +15,7 @@
 #include <utility>
 #include <vector>
 
+#include "client/node/ended_nodes.hpp"
 #include "client/node/node_core.hpp"
 #include "shm/clock.hpp"
 #include "shm/segment.hpp"
@@ -60,6 +64,11 @@ PortAtHand port_at_hand(wire::MessageKind kind, const Core& core, std::uint32_t 
   return port;
 }
 
+bool has_hung_up(const shm::FileDescriptor& socket) {
+  pollfd state{socket.get(), 0, 0};
+  return ::poll(&state, 1, 0) != 0;
+}
+
 bool is_handed_back(const shm::FileDescriptor& socket, const PortAtHand& port) {
   if (!is_sent(socket, port.message, {port.first.get(), port.second.get()})) return false;
   for (const HeldLink& link : port.links) {
@@ -89,15 +98,13 @@ void NodeCore::ring_timer_every(Clock::duration time) const {
   timerfd_settime(timer_.get(), 0, &at, nullptr);
 }
 
-void NodeCore::lose_daemon() {
-  const std::lock_guard lock(mutex_);
-  be_alone(kRejoinInterval);
-}
+void NodeCore::lose_daemon() noexcept { be_alone(kRejoinInterval); }
 
-void NodeCore::be_alone(Clock::duration look_again_in) {
-  epoll_ctl(epoll_.get(), EPOLL_CTL_DEL, socket_->get(), nullptr);
+void NodeCore::be_alone(Clock::duration look_again_in) noexcept {
+  if (socket_ != nullptr) epoll_ctl(epoll_.get(), EPOLL_CTL_DEL, socket_->get(), nullptr);
   hang_up();
   socket_ = nullptr;
+  outbox_.clear();
   standing_ = Standing::kAlone;
   ring_timer_every(look_again_in);
   news_.notify_all();
@@ -131,20 +138,18 @@ void NodeCore::rejoin() {
   const bool are_whole = std::all_of(
       ports.begin(), ports.end(), [](const PortAtHand& port) { return port.first && port.second; });
   if (!are_whole) {
-    static_cast<void>(hand_back_memory(*socket));
+    static_cast<void>(hand_back_memory(*socket, true));
     const std::lock_guard lock(mutex_);
     turned_away_ = no_descriptor_left("its ports");
     ring_timer_every(kTurnedAwayInterval);
     return;
   }
-  // With nothing to hand back there is nothing to keep of the old memory either. But the hello says
-  // which node this was, and of which memory, lest the daemon keep names for it that it has closed
-  // or never got.
-  is_anew_ = ports.empty();
+  // Who has no ports left may be the last that has the memory, and with it what is active, and
+  // which model is in force.
+  has_no_ports_ = ports.empty();
   asked_ = shm::monotonic_now();
-  const bool is_said = is_anew_ ? is_sent(*socket, hello(), {memory_->board().get(), -1})
-                                : hand_back(*socket, ports);
-  if (!is_said) return;
+  if (!hand_back(*socket, ports)) return;
+  make_non_blocking(*socket);
   shm::close_in_children(*socket);
   const std::lock_guard lock(mutex_);
   socket_ = socket;
@@ -160,9 +165,9 @@ void NodeCore::rejoin() {
   }
 }
 
-bool NodeCore::hand_back_memory(const shm::FileDescriptor& socket) const {
+bool NodeCore::hand_back_memory(const shm::FileDescriptor& socket, bool has_ports) const {
   wire::Message message = hello();
-  message.flags |= wire::kRejoins;
+  message.flags |= wire::kRejoins | (has_ports ? 0u : wire::kHasNoPorts);
   if (!is_sent(socket, message, {memory_->board().get(), memory_->registry().get()})) return false;
   for (const auto& page : memory_->pages_at_hand()) {
     message = {};
@@ -176,7 +181,7 @@ bool NodeCore::hand_back_memory(const shm::FileDescriptor& socket) const {
 
 bool NodeCore::hand_back(const shm::FileDescriptor& socket,
                          const std::vector<PortAtHand>& ports) const {
-  if (!hand_back_memory(socket)) return false;
+  if (!hand_back_memory(socket, !ports.empty())) return false;
   for (const PortAtHand& port : ports) {
     if (!is_handed_back(socket, port)) return false;
   }
@@ -198,7 +203,7 @@ void NodeCore::be_welcomed(wire::Received& welcome) {
   has_told_of_clock_ = false;
   if (!shm::are_one_segment(welcome.descriptors[0], memory_->board())) {
     try {
-      if (!is_anew_) throw std::runtime_error("the daemon has other memory");
+      if (!has_no_ports_) throw std::runtime_error("the daemon has other memory");
       memory_ = std::make_shared<SharedMemory>(std::move(welcome.descriptors[0]),
                                                std::move(welcome.descriptors[1]), service_bell_,
                                                residence());
@@ -212,10 +217,42 @@ void NodeCore::be_welcomed(wire::Received& welcome) {
   ++conversation_;
   node_ = welcome.message.link;
   turned_away_.clear();
+  say_who_has_ended();
   for (const auto& [instance, output] : outputs_) output->doubt_taps();
   describe_again();
   reopen_taps();
   news_.notify_all();
+}
+
+bool NodeCore::is_heard() const noexcept {
+  if (standing_ != Standing::kMember || socket_ == nullptr || !outbox_.empty()) return false;
+  int unread = 0;  // bytes
+  return !has_hung_up(*socket_) && ::ioctl(socket_->get(), SIOCOUTQ, &unread) == 0 && unread == 0;
+}
+
+void NodeCore::remember_end() const noexcept {
+  if (node_ == 0 || is_heard()) return;
+  try {
+    remember_ended(shm::identity_of(memory_->board()), node_);
+  } catch (const std::exception&) {  // its memory is there
+  }
+}
+
+void NodeCore::say_who_has_ended() noexcept {
+  try {
+    const auto board = shm::identity_of(memory_->board());
+    while (const std::uint64_t ended = take_ended(board)) {
+      wire::Message message;
+      message.kind = wire::MessageKind::kNodeEnded;
+      message.link = ended;
+      say(message);
+      if (socket_ == nullptr || has_hung_up(*socket_)) {  // to the next daemon, then
+        remember_ended(board, ended);
+        return;
+      }
+    }
+  } catch (const std::exception&) {
+  }
 }
 
 // The conversation is over; but the daemon may be replaced by one that knows us.

@@ -111,6 +111,7 @@ void NodeCore::pump(int timeout_ms) {
   tidy();
   {
     const std::lock_guard lock(mutex_);
+    say_what_waits();
     say_descriptions();
   }
   const Socket socket = this->socket();
@@ -128,9 +129,11 @@ void NodeCore::pump(int timeout_ms) {
       case wire::ReceiveResult::kNothing:
         return;
       case wire::ReceiveResult::kClosed:
-      case wire::ReceiveResult::kMalformed:
-        lose_daemon();
+      case wire::ReceiveResult::kMalformed: {
+        const std::lock_guard lock(mutex_);
+        if (socket_ == socket) lose_daemon();
         return;
+      }
     }
     if (this->socket() != socket || has_notices()) return;
   }
@@ -178,9 +181,11 @@ std::string NodeCore::no_descriptor_left(const char* what_for) {
 void NodeCore::handle_without_descriptors(const wire::Message& message) {
   const std::string why = no_descriptor_left("what the daemon sends");
   switch (message.kind) {
-    case wire::MessageKind::kWelcome:
+    case wire::MessageKind::kWelcome: {
+      const std::lock_guard lock(mutex_);
       lose_daemon();  // and tries again
       return;
+    }
     case wire::MessageKind::kOutputPeer:
     case wire::MessageKind::kInputPeer:
       refuse_peer(message, why);

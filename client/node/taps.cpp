@@ -49,9 +49,7 @@ void NodeCore::add_tap(const wire::Received& received) {
   answer.peer = message.peer;
   answer.link = entry.link;
   answer.value = entry.place;
-  if (socket_ == nullptr) return;
-  static_cast<void>(
-      wire::send_message(socket_->get(), answer, {entry.memory->readable().get(), -1}));
+  say(answer, {entry.memory->readable().get(), -1});
 }
 
 void NodeCore::add_tap_source(const wire::Received& received) {
@@ -139,9 +137,7 @@ void NodeCore::reopen_taps() {
     question.flags = wire::kRejoins | (tap->options().of == TapOf::input ? wire::kTapsInput : 0u);
     question.set_name(tap->name());
     reopened_[question.request] = tap;
-    static_cast<void>(
-        wire::send_message(socket_->get(), question,
-                           {tap->segment_descriptor().get(), tap->bell().for_publishers().get()}));
+    say(question, {tap->segment_descriptor().get(), tap->bell().for_publishers().get()});
   }
 }
 

@@ -93,11 +93,11 @@ class Client {
   // For messages to people: node "object-detector" (pid 4711).
   [[nodiscard]] std::string description() const;
 
-  std::string name;   // of the node; empty until it has said hello
-  NodeId node = 0;    // 0 until it has been welcomed
-  NodeId former = 0;  // that it was before, and has nothing left of
+  std::string name;  // of the node; empty until it has said hello
+  NodeId node = 0;   // 0 until it has been welcomed
   std::uint64_t hello_request = 0;
   bool is_turned_away = false;  // what it says after that is not heard
+  bool is_taken_anew = false;   // it came back from another daemon: what it hands back is not ours
   bool has_service_thread = false;
   bool is_component = false;  // has opened a port once
   bool comes_back = false;    // if the conversation is lost: then its ports are kept for it

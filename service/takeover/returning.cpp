@@ -221,19 +221,14 @@ void Takeover::give_up(NodeId node) {
   host_.try_postponed();
 }
 
-void Takeover::forget_former(const Client& client) {
-  if (client.former == 0) return;
-  end_conversation_of(client, client.former);
-  const auto found = absentees_.find(client.former);
+void Takeover::forget_ended(const Client& client, NodeId ended) {
+  end_conversation_of(client, ended);
+  const auto found = absentees_.find(ended);
   if (found == absentees_.end() || !is_that(client, found->second)) return;
-  log::info("{} is here again, without the {} ports that were kept for it", client.description(),
-            found->second.ports.size());
-  give_up(client.former);
-}
-
-void Takeover::know(const Client& client) {
-  strangers_.welcome(client);
-  forget_former(client);
+  const std::size_t ports = found->second.ports.size();
+  log::info("another node of the process of {} has ended without a daemon, and left {} port{}",
+            client.description(), ports, ports == 1 ? "" : "s");
+  give_up(ended);
 }
 
 Charge Takeover::make_room_for(const Client& newcomer, NodeId former) {

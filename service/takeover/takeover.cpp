@@ -181,9 +181,6 @@ shm::Nanoseconds Takeover::deadline() const {
 
 void Takeover::advance(shm::Nanoseconds now) {
   if (phase_ == Phase::kServing) return;
-  for (const ClientId id : std::vector(waiting_)) {  // who is dropped may end others' waiting
-    if (const Client* const client = clients_.find(id)) forget_former(*client);
-  }
   const bool all_are_back = phase_ == Phase::kTakingOver && absentees_.empty() &&
                             std::none_of(clients_.begin(), clients_.end(), [](const auto& each) {
                               return each.second->is_returning;

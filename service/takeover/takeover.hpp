@@ -104,11 +104,13 @@ class Takeover {
   [[nodiscard]] const Strangers& strangers() const { return strangers_; }
   [[nodiscard]] Deaths& deaths() { return deaths_; }
   // That component is no stranger from now on.
-  void know(const Client& client);
+  void know(const Client& client) { strangers_.welcome(client); }
 
   // The conversation with a component is lost, and its process lives: its ports are kept for it.
   void set_away(Client& client);
   void forget_absentee(NodeId node);
+  // A node of that client's process has ended and was not heard: nothing is kept for it.
+  void forget_ended(const Client& client, NodeId ended);
   // What the absentee has taken of its user's share, for the process that was it. Throws
   // LimitExceeded where there is no room for another. `former`: who it says that it was; 0: nobody.
   [[nodiscard]] Charge make_room_for(const Client& newcomer, NodeId former);
@@ -140,9 +142,6 @@ class Takeover {
   void log_end_of(const Absentee& absentee);
   void end_conversation_of(const Client& client, NodeId node);
   [[nodiscard]] static bool is_that(const Client& client, const Absentee& absentee);
-  // Nothing is kept for the node that a client was and has nothing left of: what it closed without
-  // a daemon, or was never told that it got.
-  void forget_former(const Client& client);
   void give_up(NodeId node);
   void finish();
   void remember_components();

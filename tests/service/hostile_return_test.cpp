@@ -16,6 +16,7 @@
 #include "service/kept/registry.hpp"
 #include "shm/activity.hpp"
 #include "shm/output_segment.hpp"
+#include "shm/segment.hpp"
 #include "shm/table_ring.hpp"
 #include "tests/client/component.hpp"
 #include "tests/client/models.hpp"
@@ -291,14 +292,20 @@ TEST(HostileReturn, WithANumberOfOtherMemoryCostsNobodyWhatIsKept) {
     open_raw_output(lost, "/out", segment);
   }
   await([&] { return daemon.source("/out")["away"] == true; });
-  auto hello = RawClient::hello_message("another");
+  auto hello = RawClient::hello_message("another", wire::kRejoins | wire::kHasNoPorts);
   hello.link = welcome.message.link;
+  const auto other_memory = shm::make_segment("other", 4096);
   RawClient another(daemon.instance());
-  another.send(hello);
+  another.send(hello, {other_memory.get(), other_memory.get()});
   another.expect(MessageKind::kWelcome);
+  another.send(RawClient::message(MessageKind::kHandBackPage), {other_memory.get(), -1});
+  another.send(RawClient::message(MessageKind::kHandedBack));
+  another.send(RawClient::message(MessageKind::kStatus));
+  another.expect(MessageKind::kStatusReply);
   EXPECT_TRUE(daemon.source("/out")["away"]);
   RawClient itself(daemon.instance());
-  itself.send(hello, {welcome.descriptors[0].get(), -1});
+  itself.send(hello, {welcome.descriptors[0].get(), welcome.descriptors[1].get()});
+  itself.send(RawClient::message(MessageKind::kHandedBack));
   itself.expect(MessageKind::kWelcome);
   EXPECT_FALSE(daemon.source("/out")["away"]);
 }

@@ -159,7 +159,7 @@ TEST(ProtocolPage, SaysWhatAnswersWhat) {
   for (const MessageKind kind :
        {MessageKind::kClosePort, MessageKind::kSynced, MessageKind::kPeerRefused,
         MessageKind::kHandBackLink, MessageKind::kHandedBack, MessageKind::kBlind,
-        MessageKind::kTapped, MessageKind::kDescribe}) {
+        MessageKind::kTapped, MessageKind::kDescribe, MessageKind::kNodeEnded}) {
     note(kind, client.say(kind));
   }
   // To nobody who has lost no daemon.

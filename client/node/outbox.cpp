@@ -1,0 +1,65 @@
+#include "client/node/outbox.hpp"
+
+#include <fcntl.h>
+
+#include <exception>
+#include <utility>
+
+namespace arbiter::detail {
+
+void make_non_blocking(const shm::FileDescriptor& socket) noexcept {
+  fcntl(socket.get(), F_SETFL, O_NONBLOCK);
+}
+
+bool Outbox::send(int socket, const wire::Message& message, Descriptors descriptors) noexcept {
+  if (!waiting_.empty()) return keep(message, descriptors);
+  switch (wire::send_message(socket, message, descriptors)) {
+    case wire::SendResult::kSent:
+    case wire::SendResult::kClosed:
+      return true;
+    case wire::SendResult::kFull:
+      return keep(message, descriptors);
+    case wire::SendResult::kTooMany:
+      break;
+  }
+  return false;
+}
+
+bool Outbox::keep(const wire::Message& message, Descriptors descriptors) noexcept try {
+  if (waiting_.size() == kMostWaiting) return false;
+  Waiting waiting{message, {}};
+  for (std::size_t i = 0; i < descriptors.size() && descriptors[i] >= 0; ++i) {
+    waiting.descriptors[i].reset(fcntl(descriptors[i], F_DUPFD_CLOEXEC, 0));
+    if (!waiting.descriptors[i]) return false;
+    shm::close_in_children(waiting.descriptors[i]);
+  }
+  waiting_.push_back(std::move(waiting));
+  return true;
+} catch (const std::exception&) {  // no memory
+  return false;
+}
+
+bool Outbox::flush(int socket) noexcept {
+  while (!waiting_.empty()) {
+    const Waiting& next = waiting_.front();
+    Descriptors descriptors{};
+    for (std::size_t i = 0; i < descriptors.size(); ++i) {
+      descriptors[i] = next.descriptors[i] ? next.descriptors[i].get() : -1;
+    }
+    switch (wire::send_message(socket, next.message, descriptors)) {
+      case wire::SendResult::kSent:
+        waiting_.pop_front();
+        break;
+      case wire::SendResult::kFull:
+        return true;
+      case wire::SendResult::kClosed:
+        waiting_.clear();
+        return true;
+      case wire::SendResult::kTooMany:
+        return false;
+    }
+  }
+  return true;
+}
+
+}  // namespace arbiter::detail

@@ -1,0 +1,114 @@
+// What a node says to a daemon that does not read: it holds up nobody, and nothing of it is lost.
+#include "client/node/outbox.hpp"
+
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <sys/socket.h>
+
+#include <algorithm>
+#include <string>
+#include <vector>
+
+#include <arbiter/arbiter.hpp>
+
+#include "shm/segment.hpp"
+#include "tests/client/models.hpp"
+#include "tests/client/samples.hpp"
+#include "tests/support/daemon.hpp"
+
+namespace arbiter::test {
+namespace {
+
+using detail::Outbox;
+
+class OutboxOfASocket : public testing::Test {
+ protected:
+  OutboxOfASocket() {
+    int ends[2] = {-1, -1};
+    if (::socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0, ends) != 0)
+      throw Error("socketpair");
+    node_.reset(ends[0]);
+    daemon_.reset(ends[1]);
+    detail::make_non_blocking(node_);
+  }
+
+  static wire::Message numbered(std::uint64_t number) {
+    wire::Message message;
+    message.request = number;
+    message.set_text("so that it takes up room");
+    return message;
+  }
+  // What has come by now; the number of the message is that of its place.
+  void hear_all() {
+    wire::Received received;
+    while (wire::receive_message(daemon_.get(), received, false) ==
+           wire::ReceiveResult::kReceived) {
+      EXPECT_EQ(received.message.request, ++heard_);
+      has_descriptor_.push_back(static_cast<bool>(received.descriptors[0]));
+    }
+  }
+
+  shm::FileDescriptor node_;
+  shm::FileDescriptor daemon_;
+  Outbox outbox_;
+  std::uint64_t heard_ = 0;
+  std::vector<bool> has_descriptor_;
+};
+
+TEST_F(OutboxOfASocket, KeepsWhatThereIsNoRoomForInItsOrder) {
+  std::uint64_t said = 0;
+  while (outbox_.empty()) ASSERT_TRUE(outbox_.send(node_.get(), numbered(++said)));
+  {
+    const shm::FileDescriptor own = shm::make_segment("test", 4096);
+    ASSERT_TRUE(outbox_.send(node_.get(), numbered(++said), {own.get(), -1}));
+  }
+  ASSERT_TRUE(outbox_.flush(node_.get())) << "there is no room yet";
+  EXPECT_FALSE(outbox_.empty());
+  hear_all();
+  ASSERT_TRUE(outbox_.send(node_.get(), numbered(++said))) << "behind what waits";
+  ASSERT_TRUE(outbox_.flush(node_.get()));
+  EXPECT_TRUE(outbox_.empty());
+  hear_all();
+  EXPECT_EQ(heard_, said);
+  ASSERT_EQ(has_descriptor_.size(), said);
+  EXPECT_TRUE(has_descriptor_[said - 2]) << "a copy, for the sender's has been closed";
+  EXPECT_EQ(std::count(has_descriptor_.begin(), has_descriptor_.end(), true), 1);
+}
+
+TEST_F(OutboxOfASocket, EndsTheConversationWhereTooMuchWaits) {
+  std::uint64_t said = 0;
+  while (outbox_.send(node_.get(), numbered(++said))) ASSERT_LT(said, 100'000u);
+  EXPECT_GT(said, 4096u);
+}
+
+TEST_F(OutboxOfASocket, ForgetsWhatNobodyWillRead) {
+  for (std::uint64_t said = 0; outbox_.empty();) {
+    ASSERT_TRUE(outbox_.send(node_.get(), numbered(++said)));
+  }
+  daemon_.reset();
+  EXPECT_TRUE(outbox_.flush(node_.get()));
+  EXPECT_TRUE(outbox_.empty());
+}
+
+// More than a socket has room for.
+TEST(Outbox, OfANodeThatClosesItsPortsHasTheDaemonHearOfEach) {
+  constexpr int kPorts = 300;
+  rlimit limit{};
+  ASSERT_EQ(::getrlimit(RLIMIT_NOFILE, &limit), 0);
+  limit.rlim_cur = std::min<rlim_t>(limit.rlim_max, 16 * kPorts);
+  ASSERT_EQ(::setrlimit(RLIMIT_NOFILE, &limit), 0);
+  Daemon daemon(single_model());
+  NodeOptions options;
+  options.on_notice = [](const Notice&) {};  // that no model mentions them
+  Node node("test", options);
+  std::vector<OutputPort<void>> ports;
+  const auto name_of = [](int i) { return "/" + std::to_string(i); };
+  for (int i = 0; i < kPorts; ++i) ports.push_back(node.output_port(name_of(i)));
+  daemon.process().stop();
+  ports.clear();
+  daemon.process().resume();
+  for (int i = 0; i < kPorts; ++i) ports.push_back(node.output_port(name_of(i)));
+}
+
+}  // namespace
+}  // namespace arbiter::test
