@@ -80,7 +80,7 @@ void WhyAnswer::check_source() const {
 }
 
 bool WhyAnswer::is_only_named(const std::string& source) const {
-  return options_.source.empty() && !options_.all && obstacles_.was_never_started(source) &&
+  return options_.source.empty() && !options_.all && obstacles_.is_out_of_use(source) &&
          std::find(reasons_.begin(), reasons_.end(), source) == reasons_.end();
 }
 
@@ -159,7 +159,7 @@ void WhyAnswer::write_only_named() const {
   names.insert(names.end(), explanation_.senses.begin(), explanation_.senses.end());
   std::erase_if(names, [this](const std::string& source) { return !is_only_named(source); });
   if (names.empty()) return;
-  out_ << "\nNever started (no component has opened them): " << rules::enumerate(names)
+  out_ << "\nNever active (no component has them open): " << rules::enumerate(names)
        << (names.size() > rules::kMaxNamesInWords ? " (--all shows all)" : "") << '\n';
 }
 

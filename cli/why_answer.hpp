@@ -34,7 +34,8 @@ class WhyAnswer {
 
  private:
   [[nodiscard]] bool is_sensed(const std::string& source) const;
-  // Of those that nobody has ever started, and that keep nobody out, the names are enough.
+  // Of those that nobody has open, that never were active, and that keep nobody out, the names are
+  // enough.
   [[nodiscard]] bool is_only_named(const std::string& source) const;
   // Of a port with many connections a part is told, which fits a screen.
   [[nodiscard]] bool is_large() const;

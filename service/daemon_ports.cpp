@@ -110,6 +110,7 @@ void Daemon::finish_opening(Client& client, std::uint64_t request, std::unique_p
   }
   client.send(reply, {source.page.writable.get(), -1});
   refusals_.forget(Refusals::End::kOutput, source.name);
+  takeover_.deaths().note_output_opened(source.name);
   at_step("output-open");
   log_event({EventKind::kOpened, {client.name}, {source.name}}, log::level::info,
             "{} opened output port {}", client.description(), source.name);
@@ -133,6 +134,7 @@ void Daemon::open_input(Client& client, wire::Received& received) {
   reply.id = input.id;
   client.send(reply);
   refusals_.forget(Refusals::End::kInput, name);
+  takeover_.deaths().note_input_opened(name);
   at_step("input-open");
   log_event({EventKind::kOpened, {client.name}, {}, {name}}, log::level::info,
             "{} opened input port {}", client.description(), name);

@@ -1,6 +1,9 @@
 // Doctor: components that died, and that nobody has started again.
+#include <algorithm>
 #include <set>
+#include <string>
 #include <utility>
+#include <vector>
 
 #include "rules/text/names.hpp"
 #include "shm/clock.hpp"
@@ -15,7 +18,7 @@ bool is_left(const auto* port) {
   return port != nullptr && port->mentioned && !port->open && !port->away_pid;
 }
 
-// What the model knows of those ports, and nobody has open; and no later death has told of.
+// What the model knows of those ports, and nobody has opened since; and no later death has told of.
 struct Left {
   std::vector<std::string> ports;
   std::vector<std::string> active;  // those whose last arrival counts for ever
@@ -23,14 +26,20 @@ struct Left {
 
 Left left_by(const wire::Status& status, const wire::DeathStatus& death,
              std::set<std::string>& told) {
+  // Whoever had it last has closed it in good order, or died as well.
+  const auto is_settled = [&](const std::string& port) {
+    return std::find(death.opened_since.begin(), death.opened_since.end(), port) !=
+           death.opened_since.end();
+  };
   Left left;
   for (const std::string& port : death.outputs) {
     const wire::SourceStatus* source = status.find_source(port);
-    if (!is_left(source) || !told.insert(port).second) continue;
+    if (is_settled(port) || !is_left(source) || !told.insert(port).second) continue;
     left.ports.push_back(port);
     if (source->active && source->timeout == shm::kForever) left.active.push_back(port);
   }
   for (const std::string& port : death.inputs) {
+    if (is_settled(port)) continue;
     if (is_left(status.find_input(port)) && told.insert(port).second) left.ports.push_back(port);
   }
   return left;

@@ -62,13 +62,14 @@ struct PortEnd {
 constexpr PortEnd kOutput{&wire::RefusalStatus::output, &wire::DeathStatus::outputs};
 constexpr PortEnd kInput{&wire::RefusalStatus::input, &wire::DeathStatus::inputs};
 
-// Who has died with the port open last; null: nobody, as far as the daemon remembers.
+// Who had the port open last and died; null: nobody, as far as the daemon remembers.
 const wire::DeathStatus* death_of(const wire::Status& status, const PortEnd& end,
                                   const std::string& port) {
   const auto found =
       std::find_if(status.deaths.begin(), status.deaths.end(),
                    [&](const auto& each) { return contains(each.*end.left_open, port); });
-  return found == status.deaths.end() ? nullptr : &*found;
+  const bool is_last = found != status.deaths.end() && !contains(found->opened_since, port);
+  return is_last ? &*found : nullptr;
 }
 
 // Who has asked for the port in vain last; null: nobody, or only while another had it who has died.
@@ -267,8 +268,6 @@ void Obstacles::add_publisher(const std::string& source, std::vector<Obstacle>& 
   if (stranger != nullptr) return;
   const auto* refusal = refusal_of(status_, kOutput, source);
   const auto* death = death_of(status_, kOutput, source);
-  // Another component has had it since.
-  if (death != nullptr && state.last_arrival() > death->at) death = nullptr;
   const std::string not_open = "no component has the output port open";
   if (refusal != nullptr) {
     result.push_back({"output-not-open", not_open});
@@ -276,8 +275,9 @@ void Obstacles::add_publisher(const std::string& source, std::vector<Obstacle>& 
   } else if (death != nullptr) {
     result.push_back({"output-not-open", not_open + " any longer" + death_text(death)});
   } else if (state.word == shm::kNeverActive) {
-    result.push_back(
-        {"output-not-open", not_open + ": it was never started, or opens it under another name"});
+    result.push_back({"output-not-open",
+                      not_open + ", and it was never active: its component does not run, or opens "
+                                 "it under another name"});
   } else {
     result.push_back({"output-not-open", not_open +
                                              " any longer: its component closed it or died, or the "
@@ -319,7 +319,7 @@ std::string Obstacles::why_nothing_comes_of(const std::string& source) const {
   return "";
 }
 
-bool Obstacles::was_never_started(const std::string& source) const {
+bool Obstacles::is_out_of_use(const std::string& source) const {
   const wire::SourceStatus* output = status_.find_source(source);
   return output != nullptr && !output->open && !output->away_pid &&
          stranger_with(&StrangerStatus::outputs, source) == nullptr &&

@@ -33,7 +33,7 @@ class Obstacles {
   // Why nothing of a winner reaches the port; empty where something does, as far as is known.
   [[nodiscard]] std::string why_nothing_comes_of(const std::string& source) const;
   // Nobody has it open, nothing has ever arrived, and nothing else could be meant by the name.
-  [[nodiscard]] bool was_never_started(const std::string& source) const;
+  [[nodiscard]] bool is_out_of_use(const std::string& source) const;
   // "nav (pid 12)", empty where nobody has it open.
   [[nodiscard]] std::string component_of(const std::string& source) const;
 

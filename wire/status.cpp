@@ -106,6 +106,7 @@ void describe(auto& field, Is<DeathStatus> auto& of) {
   field("at_ns", of.at);
   field("outputs", of.outputs);
   field("inputs", of.inputs);
+  field("opened_since", of.opened_since);
 }
 
 void describe(auto& field, Is<RefusalStatus> auto& of) {

@@ -81,6 +81,7 @@ struct DeathStatus {
   shm::Nanoseconds at = 0;  // CLOCK_MONOTONIC: when the daemon learned of it
   std::vector<std::string> outputs;
   std::vector<std::string> inputs;
+  std::vector<std::string> opened_since;  // of both, by anybody
 };
 
 // A port that a component has asked for and was refused. It has one of the two.

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <deque>
 #include <string>
+#include <vector>
 
 #include "service/log/event.hpp"
 #include "shm/clock.hpp"
@@ -23,12 +24,26 @@ class Deaths {
                         user,
                         shm::monotonic_now(),
                         {event.sources.begin(), event.sources.end()},
-                        {event.ports.begin(), event.ports.end()}});
+                        {event.ports.begin(), event.ports.end()},
+                        {}});
     if (deaths_.size() > kMost) make_room();
   }
+  void note_output_opened(const std::string& name) {
+    note_opened(&wire::DeathStatus::outputs, name);
+  }
+  void note_input_opened(const std::string& name) { note_opened(&wire::DeathStatus::inputs, name); }
   [[nodiscard]] const std::deque<wire::DeathStatus>& all() const { return deaths_; }
 
  private:
+  void note_opened(std::vector<std::string> wire::DeathStatus::*left_open,
+                   const std::string& name) {
+    const auto has = [&](const std::vector<std::string>& names) {
+      return std::find(names.begin(), names.end(), name) != names.end();
+    };
+    for (wire::DeathStatus& death : deaths_) {
+      if (has(death.*left_open) && !has(death.opened_since)) death.opened_since.push_back(name);
+    }
+  }
   // The user who has most gives way, and the earliest of these: nobody pushes out what others miss.
   void make_room() {
     const auto count = [&](const wire::DeathStatus& death) {

@@ -118,7 +118,7 @@ TEST(WhyDaemon, ThatHasLostItsStateSaysWhoRunsThatItDoesNotKnow) {
   EXPECT_THAT(text, AllOf(HasSubstr("nobody wins"), HasSubstr("\n  " + unknown),
                           Not(HasSubstr("no component has the port open")),
                           HasSubstr("\n/rest is kept out"), HasSubstr("restart it"),
-                          HasSubstr("Never started (no component has opened them): /track\n")));
+                          HasSubstr("Never active (no component has them open): /track\n")));
   const json answer = why_json({"/arm"});
   EXPECT_THAT(codes(answer["obstacles"]), ElementsAre("component-unknown"));
   EXPECT_THAT(codes(connection(answer, "/rest")["obstacles"]), ElementsAre("component-unknown"));

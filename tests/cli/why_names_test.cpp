@@ -82,8 +82,8 @@ TEST(WhyNames, TellsHowToEndALatchWhoseProcessIsGoneAndElseWhoHoldsIt) {
     EXPECT_THAT(why({"/base"}), AllOf(HasSubstr("component test (pid " + pid() + ") has it open"),
                                       Not(HasSubstr("arbiter deactivate"))));
   }
-  EXPECT_THAT(why({"/base"}), AllOf(HasSubstr("arbiter deactivate /stop ends it"),
-                                    Not(HasSubstr("never started"))));
+  EXPECT_THAT(why({"/base"}),
+              AllOf(HasSubstr("arbiter deactivate /stop ends it"), Not(HasSubstr("never active"))));
   EXPECT_THAT(why({"/base", "/drive"}), HasSubstr("! /stop: T is forever"));
   EXPECT_EQ(arbiter({"deactivate", "/stop"}).exit_code, 0);
   EXPECT_THAT(why({"/base"}), HasSubstr("/drive wins"));
@@ -179,10 +179,10 @@ TEST(WhyNames, TellsWhoWouldLikeToWinFirstAndOnlyNamesWhoWasNeverStarted) {
   EXPECT_LT(text.find("\n/s111 is kept out"), text.find("\n/s100 is kept out"));
   EXPECT_THAT(text, AllOf(HasSubstr("has it open, and has sent nothing since\n  and by the rules: "
                                     "arbiter why /base /s100"),
-                          HasSubstr("Never started (no component has opened them): /s101, /s102"),
+                          HasSubstr("Never active (no component has them open): /s101, /s102"),
                           HasSubstr("\n/go is sensed"), Not(HasSubstr("\n/s101"))));
   EXPECT_THAT(why({"/base", "--all"}),
-              AllOf(HasSubstr("\n/s101 is kept out"), Not(HasSubstr("Never started"))));
+              AllOf(HasSubstr("\n/s101 is kept out"), Not(HasSubstr("Never active"))));
   EXPECT_THAT(why({"/base", "/s101"}), HasSubstr("\n/s101 is kept out"));
   EXPECT_EQ(why_json({"/base"})["connections"].size(), 12u);
 }

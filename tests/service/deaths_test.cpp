@@ -42,6 +42,19 @@ TEST(Deaths, OfOneUserPushOutNoneOfAnother) {
   EXPECT_THAT(deaths.all(), testing::Contains(Field(&wire::DeathStatus::node, "stop")));
 }
 
+TEST(Deaths, SayWhichPortsHaveBeenOpenedSince) {
+  Deaths deaths;
+  deaths.note({EventKind::kDied, {"arm"}, {"/out", "/other"}, {"/in"}}, 1, 7);
+  deaths.note_input_opened("/out");
+  EXPECT_THAT(deaths.all()[0].opened_since, testing::IsEmpty()) << "an input port of that name";
+  deaths.note_output_opened("/out");
+  deaths.note_output_opened("/out");
+  deaths.note_input_opened("/in");
+  EXPECT_THAT(deaths.all()[0].opened_since, testing::ElementsAre("/out", "/in"));
+  deaths.note({EventKind::kDied, {"arm"}, {"/out"}, {}}, 2, 7);
+  EXPECT_THAT(deaths.all()[0].opened_since, testing::IsEmpty());
+}
+
 // A process that waits until it is let go; the test's own child, for which it has to wait.
 class Child {
  public:

@@ -115,6 +115,10 @@ void see_deaths(ObservedFields& observed) {
   while (status["deaths"].empty()) status = daemon.status();
   EXPECT_EQ(status["deaths"][0]["outputs"], json::array({"/out"}));
   EXPECT_EQ(status["deaths"][0]["inputs"], json::array({"/in"}));
+  Component again("arm");
+  ASSERT_EQ(again.tell("output /out"), "open");
+  status = daemon.status();
+  EXPECT_EQ(status["deaths"][0]["opened_since"], json::array({"/out"}));
   observed.see(status);
 }
 

@@ -196,20 +196,24 @@ TEST(Doctor, FindsWhoDiedAndWasNotStartedAgain) {
   const shm::Nanoseconds second = 1'000'000'000;
   wire::Status status;
   status.sources = {{"/o", true, false, second, {}, {}}, {"/p", true, false, second, {}, {}}};
-  status.deaths = {{"dead", 44, 1000, 13, {"/o", "/unmentioned"}, {"/gone"}}};
+  status.deaths = {{"dead", 44, 1000, 13, {"/o", "/unmentioned"}, {"/gone"}, {}}};
   const Findings findings = watch::examine_deaths(status);
   ASSERT_THAT(codes_of(findings), ElementsAre("dead-component"));
   EXPECT_THAT(findings[0].what, testing::StartsWith("dead (pid 44) died "));
   EXPECT_THAT(findings[0].what, testing::EndsWith(" ago, and nobody has /o open"));
   EXPECT_EQ(findings[0].mend, "start that component again");
   // Of two who had it, the last one is told of.
-  status.deaths.push_back({"before", 40, 1000, 12, {"/o", "/p"}, {}});
+  status.deaths.push_back({"before", 40, 1000, 12, {"/o", "/p"}, {}, {}});
   EXPECT_THAT(watch::examine_deaths(status)[1].what, testing::EndsWith("nobody has /p open"));
   status.sources[0].active = true;
   status.sources[0].timeout = shm::kForever;
   const Findings for_ever = watch::examine_deaths(status);
   EXPECT_THAT(for_ever[0].why, testing::StartsWith("the activity of /o lasts for ever"));
   EXPECT_THAT(for_ever[0].mend, testing::EndsWith("arbiter deactivate /o"));
+  // Whoever had it since has closed it.
+  status.deaths[0].opened_since = status.deaths[1].opened_since = {"/o"};
+  EXPECT_THAT(codes_of(watch::examine_deaths(status)), ElementsAre("dead-component"));
+  EXPECT_THAT(watch::examine_deaths(status)[0].what, testing::EndsWith("nobody has /p open"));
   // Whoever has come in its place, be it away for the moment, is enough.
   status.sources[0].away_pid = 45;
   status.sources[1].open.emplace();

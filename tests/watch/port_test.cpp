@@ -131,7 +131,7 @@ TEST(WatchedPort, KnowsWhatKeepsSamplesFromIt) {
   ASSERT_EQ(of_port.size(), 1u);
   EXPECT_STREQ(of_port[0].code, "port-not-open");
   EXPECT_EQ(obstacles.component_of("/low"), "component (pid " + std::to_string(::getpid()) + ")");
-  EXPECT_TRUE(obstacles.was_never_started("/high"));
+  EXPECT_TRUE(obstacles.is_out_of_use("/high"));
 }
 
 }  // namespace
