@@ -160,7 +160,7 @@ class ModelReader {
     if (element.text == "application") {
       reader_.error("unknown-element", reader_.where(element),
                     "this is an application file, not a model, because it has no <arbitration>; "
-                    "give it as the application");
+                    "give it with --application");
     } else if (is_root(element.text)) {
       reader_.error("unknown-element", reader_.where(element),
                     "<" + std::string(element.text) +

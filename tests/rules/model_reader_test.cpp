@@ -151,7 +151,7 @@ TEST(ModelReader, UnknownElementsAndTextAreErrors) {
       {"<behaviors><thing/></behaviors>", "1:12 error unknown-element",
        "it takes <define>, <source>, <behavior>, <meta_behavior> or <arbiter>"},
       {"<Behaviors/>", "1:1 error unknown-element", "did you mean <behaviors>?"},
-      {"<application/>", "1:1 error unknown-element", "give it as the application"},
+      {"<application/>", "1:1 error unknown-element", "give it with --application"},
       {"<source port='/a'/><behaviors/>", "1:20 error unknown-element", "put it around everything"},
       {"<behaviors><behaviors/></behaviors>", "1:12 error unknown-element",
        "put it around everything"},
