@@ -1,6 +1,7 @@
 // Connecting, opening and closing ports, questions and answers.
 #include "client/node/node_core.hpp"
 
+#include <poll.h>
 #include <sys/epoll.h>
 #include <sys/socket.h>
 #include <sys/timerfd.h>
@@ -74,6 +75,7 @@ NodeCore::NodeCore(std::string_view name, const NodeOptions& options)
 
 NodeCore::~NodeCore() {
   stop_service_thread();
+  say_the_rest();
   remember_end();
   hang_up();
 }
@@ -179,6 +181,18 @@ void NodeCore::say_what_waits() noexcept {
   if (socket_ == nullptr || outbox_.empty()) return;
   if (!outbox_.flush(socket_->get())) return lose_daemon();
   if (outbox_.empty()) heed_room(false);
+}
+
+// The end: a daemon that is only busy is to hear which ports have been closed.
+void NodeCore::say_the_rest() noexcept {
+  const auto give_up = Clock::now() + kMinAnswerTime;
+  for (;;) {
+    say_what_waits();
+    const auto left = std::chrono::ceil<milliseconds>(give_up - Clock::now());
+    if (socket_ == nullptr || outbox_.empty() || left.count() <= 0) return;
+    pollfd room{socket_->get(), POLLOUT, 0};
+    static_cast<void>(::poll(&room, 1, static_cast<int>(left.count())));
+  }
 }
 
 void NodeCore::heed_room(bool is_wanted) const noexcept {

@@ -193,6 +193,7 @@ class NodeCore : public std::enable_shared_from_this<NodeCore> {
   // good; it is over after this where that is the only way on.
   void say(const wire::Message& message, Outbox::Descriptors descriptors = {-1, -1}) noexcept;
   void say_what_waits() noexcept;
+  void say_the_rest() noexcept;
   // Whether the loop is to hear of room in the socket, too.
   void heed_room(bool is_wanted) const noexcept;
   void say_closed(shm::PortInstance port) noexcept;

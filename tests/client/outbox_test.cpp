@@ -6,7 +6,9 @@
 #include <sys/socket.h>
 
 #include <algorithm>
+#include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <arbiter/arbiter.hpp>
@@ -90,24 +92,48 @@ TEST_F(OutboxOfASocket, ForgetsWhatNobodyWillRead) {
   EXPECT_TRUE(outbox_.empty());
 }
 
-// More than a socket has room for.
-TEST(Outbox, OfANodeThatClosesItsPortsHasTheDaemonHearOfEach) {
-  constexpr int kPorts = 300;
+constexpr int kManyPorts = 300;  // to close them is more than a socket has room for
+
+void raise_descriptor_limit() {
   rlimit limit{};
   ASSERT_EQ(::getrlimit(RLIMIT_NOFILE, &limit), 0);
-  limit.rlim_cur = std::min<rlim_t>(limit.rlim_max, 16 * kPorts);
+  limit.rlim_cur = std::min<rlim_t>(limit.rlim_max, 16 * kManyPorts);
   ASSERT_EQ(::setrlimit(RLIMIT_NOFILE, &limit), 0);
-  Daemon daemon(single_model());
+}
+
+std::string name_of_port(int port) { return "/" + std::to_string(port); }
+
+// That no model mentions them.
+NodeOptions silent_options() {
   NodeOptions options;
-  options.on_notice = [](const Notice&) {};  // that no model mentions them
-  Node node("test", options);
+  options.on_notice = [](const Notice&) {};
+  return options;
+}
+
+TEST(Outbox, OfANodeThatClosesItsPortsHasTheDaemonHearOfEach) {
+  raise_descriptor_limit();
+  Daemon daemon(single_model());
+  Node node("test", silent_options());
   std::vector<OutputPort<void>> ports;
-  const auto name_of = [](int i) { return "/" + std::to_string(i); };
-  for (int i = 0; i < kPorts; ++i) ports.push_back(node.output_port(name_of(i)));
+  for (int i = 0; i < kManyPorts; ++i) ports.push_back(node.output_port(name_of_port(i)));
   daemon.process().stop();
   ports.clear();
   daemon.process().resume();
-  for (int i = 0; i < kPorts; ++i) ports.push_back(node.output_port(name_of(i)));
+  for (int i = 0; i < kManyPorts; ++i) ports.push_back(node.output_port(name_of_port(i)));
+}
+
+// Whatever waits of it when it ends.
+TEST(Outbox, OfANodeThatEndsLeavesNoPortOpen) {
+  raise_descriptor_limit();
+  Daemon daemon(single_model());
+  std::optional<Node> node(std::in_place, "test", silent_options());
+  std::vector<OutputPort<void>> ports;
+  for (int i = 0; i < kManyPorts; ++i) ports.push_back(node->output_port(name_of_port(i)));
+  daemon.process().stop();
+  ports.clear();
+  daemon.process().resume();
+  node.emplace("next", silent_options());
+  for (int i = 0; i < kManyPorts; ++i) ports.push_back(node->output_port(name_of_port(i)));
 }
 
 }  // namespace
