@@ -97,17 +97,20 @@ TakersElsewhere find_elsewhere(const OtherHosts& others, const std::string& port
     const wire::SourceStatus* const source = other.status.find_source(port);
     const bool has_it = source != nullptr && source->open;
     const std::string from = has_it ? watch::host_of(*source) : watch::kUnknownHost;
-    if (from != others.here && from != watch::kUnknownHost) continue;
-    const std::size_t before = found.takers.size();
+    const bool has_own = from != others.here && from != watch::kUnknownHost;
+    std::vector<std::string>& takers = has_own ? found.own : found.takers;
+    const std::size_t before = takers.size();
     bool reads = false;
     for (const wire::InputStatus& input : other.status.inputs) {
       const bool is_connected =
           std::any_of(input.connections.begin(), input.connections.end(), is_it);
-      const bool fits = input.open && (!input.open->type || is_same(*input.open->type, type));
-      if (is_connected && fits) found.takers.push_back(input.name + " of host " + other.name);
+      const bool fits =
+          input.open && (has_own || !input.open->type || is_same(*input.open->type, type));
+      if (is_connected && fits) takers.push_back(input.name + " of host " + other.name);
       reads = reads || std::any_of(input.senses.begin(), input.senses.end(), is_it);
     }
-    const bool takes = found.takers.size() != before;
+    if (has_own) continue;
+    const bool takes = takers.size() != before;
     if (reads && !takes) found.readers.push_back(other.name);
     const bool is_imported = has_it && from == others.here;
     found.is_imported = found.is_imported && (is_imported || !(takes || reads));
@@ -121,10 +124,18 @@ std::string TakersElsewhere::text(const std::string& port) const {
     text = "samples cross to " + rules::enumerate(takers) +
            "; what is delivered there is not counted here";
   }
-  if (readers.empty()) return text;
-  return text + (text.empty() ? "" : ". ") + "The rules of " +
-         (readers.size() == 1 ? "host " : "the hosts ") + rules::enumerate(readers) + " read " +
-         port;
+  const auto add = [&](const std::string& sentence) {
+    text += (text.empty() ? "" : ". ") + sentence;
+  };
+  if (!readers.empty()) {
+    add((readers.size() == 1 ? "The rules of host " : "The rules of the hosts ") +
+        rules::enumerate(readers) + " read " + port);
+  }
+  if (!own.empty()) {
+    add(rules::enumerate(own) + (own.size() == 1 ? " obeys" : " obey") + " the " + port +
+        " of its own host");
+  }
+  return text;
 }
 
 bool is_sent_to_others(const wire::Status& status, const std::string& port) {

@@ -36,10 +36,11 @@ struct Takers {
 struct TakersElsewhere {
   std::vector<std::string> takers;   // "/Motor/speed:i of host base"
   std::vector<std::string> readers;  // hosts whose rules read it, and which take no samples
+  std::vector<std::string> own;      // as takers, but they obey their host's own source of the name
   bool is_imported = true;           // by all of them
 
   [[nodiscard]] bool is_any() const { return !takers.empty() || !readers.empty(); }
-  // A sentence; empty: there are none.
+  // Sentences; empty: there are none.
   [[nodiscard]] std::string text(const std::string& port) const;
 };
 // A host that has the source from somewhere else, or has it open itself, takes nothing from here.

@@ -91,7 +91,7 @@ bool check_takers(const PubOptions& options, const Type& type,
   const Takers takers = find_takers(fetch_status("pub-status", options.instance), options.port,
                                     type, options.command, elsewhere);
   for (const std::string& message : takers.messages) report(message);
-  if (elsewhere.is_any()) report(elsewhere.text(options.port));
+  if (const std::string text = elsewhere.text(options.port); !text.empty()) report(text);
   return takers.is_any;
 } catch (const std::exception& error) {
   // It is not allowed, or the daemon has gone meanwhile: that is no reason not to publish, unless
