@@ -77,12 +77,21 @@ void DecisionMemory::leave_behind(const Mapping& mapping) {
   bequests_.emplace_back(mapping.data(), mapping.size(), Bequest::Kind::kNothing);
 }
 
-// Relaxed is enough, here and below: see names_.
+// Relaxed is enough, here and below: see names_. Of a watcher's names the one before the last makes
+// room: nobody but this thread reads them.
 void DecisionMemory::set_name(SourceId id, std::string name) {
   Atomic<const std::string*>& known = (*names_)[id];
   const std::string* const before = known.load(std::memory_order_relaxed);
   if (before != nullptr && *before == name) return;
-  known.store(&texts_.emplace_back(std::move(name)), std::memory_order_relaxed);
+  std::list<std::string>& texts = texts_[id];
+  const bool is_watcher = max_page_descriptors_ == 0;
+  if (is_watcher && texts.size() == 2) {
+    texts.splice(texts.end(), texts, texts.begin());
+    texts.back() = std::move(name);
+  } else {
+    texts.push_back(std::move(name));
+  }
+  known.store(&texts.back(), std::memory_order_relaxed);
 }
 
 const std::string& DecisionMemory::source_name(SourceId id) const noexcept {

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <array>
-#include <deque>
 #include <list>
 #include <map>
 #include <memory>
@@ -18,11 +17,12 @@
 
 namespace arbiter::shm {
 
-// Thread safety: one thread adds pages and names; every thread reads.
+// Thread safety: one thread adds pages and names; every thread reads. But for a watcher's names:
+// only the thread that adds reads them.
 class DecisionMemory {
  public:
-  // Of at most so many pages the descriptors are kept, for the daemon's successor. Throws
-  // std::system_error, std::runtime_error.
+  // Of at most so many pages the descriptors are kept, for the daemon's successor. None: it is a
+  // watcher's, which hands nothing back. Throws std::system_error, std::runtime_error.
   DecisionMemory(FileDescriptor board, Residence residence, std::size_t max_page_descriptors);
 
   // Of the daemon's memory what the data path reads, as far as it has been written by now: the
@@ -31,7 +31,8 @@ class DecisionMemory {
   // The source's page of that number, in force or to come. A page that cannot be locked is used
   // nevertheless: std::system_error is thrown once it is.
   void add_page(SourceId id, PageNumber number, std::string name, FileDescriptor page);
-  // Wait-free. The string stays as it is for as long as this lives.
+  // Wait-free. The string stays as it is for as long as this lives; a watcher's until its id has
+  // been given to two more names.
   [[nodiscard]] const std::string& source_name(SourceId id) const noexcept;
 
   // The thread that adds: what a daemon that takes over is handed back.
@@ -71,11 +72,14 @@ class DecisionMemory {
   std::list<Bequest> bequests_;  // of all of these mappings
 
   // A name is stored before its source's page is attached, and is looked for once the page has been
-  // found: page-attached orders the two. A source that gets another name keeps the old one in
-  // being.
+  // found: page-attached orders the two. An id that gets another name keeps those before it in
+  // being, for ports' threads and programs hold them (Sample::source()). A component can afford
+  // that: it is told of nothing but its own ports and what the models connect them to, so that the
+  // names of others do not cost it anything. A watcher is told each name that anybody opens a port
+  // by, without end: it keeps the last two of each id.
   using Names = std::array<Atomic<const std::string*>, kMaxSources>;
   const std::string unknown_ = "a source that this program does not know";
-  std::deque<std::string> texts_;  // its strings never move
+  std::map<SourceId, std::list<std::string>> texts_;  // the last name last; they never move
   std::unique_ptr<Names> names_ = std::make_unique<Names>();
 };
 
