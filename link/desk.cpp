@@ -34,9 +34,10 @@ Desk::Desk(HostCard me, Neighbours known)
   answering_ = std::thread([this] { answer_questions(); });
 }
 
+// Who has asked would hold it up until all answers of others have come.
 Desk::~Desk() {
+  close();
   socket_.reset();
-  pulse_.reset();
   {
     const std::lock_guard lock(mutex_);
     ends_ = true;
@@ -93,13 +94,13 @@ void Desk::leave() {
 }
 
 void Desk::close() {
-  leave();
   if (socket_ != nullptr) socket_->close();
   {
     const std::lock_guard lock(mutex_);
     closes_ = true;
   }
   changed_.notify_all();
+  leave();
 }
 
 OtherLinks Desk::others() const {

@@ -61,7 +61,8 @@ class Desk {
   // The network goes: nobody is heard, or asked, until join() is called again.
   void leave();
   // The last call: nobody can ask any more, and nobody else is asked. Does not wait; the destructor
-  // waits for the daemon, for those who have asked, for some seconds at most.
+  // closes first where nobody has, and waits for the daemon, for those who have asked, for some
+  // seconds at most.
   void close();
   // Takes up what has changed, here and elsewhere, and logs what hosts do not agree upon. Ten times
   // a second.

@@ -225,8 +225,12 @@ void LocalSocket::serve_program(Shared& shared, const LocalUser& who, shm::FileD
 void LocalSocket::let_in() {
   shm::FileDescriptor socket(::accept4(listener_.socket.get(), nullptr, nullptr, SOCK_CLOEXEC));
   if (!socket) {
-    // It stays readable where no descriptor is left: others need the processor, too.
-    if (errno == EMFILE || errno == ENFILE) ::poll(nullptr, 0, 100);
+    if (errno == EAGAIN || errno == ECONNABORTED || errno == EINTR) return;
+    say_sparingly(gateway::Level::kWarning,
+                  std::string("a program that asks the link cannot be let in (accept: ") +
+                      std::strerror(errno) + "); trying again");
+    // It stays readable: others need the processor, too.
+    ::poll(nullptr, 0, 100);
     return;
   }
   LocalUser who;

@@ -4,11 +4,20 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <linux/sockios.h>
+#include <sys/ioctl.h>
+#include <sys/socket.h>
+
+#include <algorithm>
+#include <memory>
+#include <string>
 
 #include "shm/clock.hpp"
 #include "tests/cli/arbiter_program.hpp"
 #include "tests/link/scene.hpp"
+#include "wire/hosts.hpp"
 #include "wire/link_call.hpp"
+#include "wire/rendezvous.hpp"
 
 namespace arbiter::test {
 namespace {
@@ -74,6 +83,31 @@ TEST_F(DeskWithoutANetwork, AnswersForItsOwnHost) {
   const auto result = arbiter({"status", "--all", "--instance", "base"});
   EXPECT_EQ(result.exit_code, 1);
   EXPECT_THAT(result.err, HasSubstr("the link has not joined its network yet"));
+}
+
+// The question waits until all hosts have been heard that there may be.
+TEST_F(DeskWithoutANetwork, EndsWithoutWaitingForAnOpenQuestion) {
+  const OwnDomain domain;
+  const gateway::Bell bell;
+  const link::Network network({domain.number(), {}, {}});
+  auto desk = std::make_unique<link::Desk>(card_of("base", 1), link::Neighbours());
+  desk->look({});
+  std::string why_not;
+  const auto program = wire::connect_to_link("base", why_not);
+  ASSERT_TRUE(program) << why_not;
+  desk->join(network, "lo", bell);
+  const std::string question =
+      wire::write_link_question({wire::kAllHosts, wire::kPrepareVerb, "rest"});
+  ASSERT_GT(::send(program->get(), question.data(), question.size(), MSG_NOSIGNAL), 0);
+  await([&] {
+    int unread = 0;
+    return ::ioctl(program->get(), SIOCOUTQ, &unread) == 0 && unread == 0;
+  });
+  desk.reset();
+  std::string answer(wire::kMaxLinkPacket, '\0');
+  answer.resize(static_cast<std::size_t>(
+      std::max<ssize_t>(::recv(program->get(), answer.data(), answer.size(), 0), 0)));
+  EXPECT_EQ(answer, "the link ends");
 }
 
 class DeskWithTooManyHosts : public DeskWithoutANetwork {};

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "link/dds/network.hpp"
+#include "link/interface_watch.hpp"
 #include "shm/file_descriptor.hpp"
 #include "tests/client/models.hpp"
 #include "tests/link/cabled_robot.hpp"
@@ -136,6 +137,29 @@ TEST_F(Cable, ANetworkEndsThoughItsAddressGoesJustThen) {
     ASSERT_EQ(::setns(there.get(), CLONE_NEWNET), 0);  // of this thread, and of those it makes
     const link::Network network({43, {"eth0"}, {}});
     place.ip("addr flush dev eth0");
+  });
+  thread.join();
+}
+
+// Whoever changes interfaces all the time must not keep a link from joining: what is left over is
+// heard afterwards, and the link joins once more.
+TEST_F(Cable, OfManyChangesALinkHearsSomeBeforeItJoins) {
+  Switch cables;
+  const NetworkNamespace place;
+  cables.connect(place, kHead);
+  std::thread thread([&] {
+    const shm::FileDescriptor there(
+        ::open(("/proc/" + place.pid() + "/ns/net").c_str(), O_RDONLY | O_CLOEXEC));
+    ASSERT_EQ(::setns(there.get(), CLONE_NEWNET), 0);  // of this thread
+    link::InterfaceWatch watch({"eth0"});
+    for (int i = 0; i < 50; ++i) {
+      place.ip("addr del 10.77.0.1/24 dev eth0");
+      place.ip("addr add 10.77.0.1/24 dev eth0");
+    }
+    watch.begin();
+    EXPECT_EQ(watch.missing(), "");
+    EXPECT_EQ(watch.change(), "a network interface was gone");
+    EXPECT_EQ(watch.change(), "");
   });
   thread.join();
 }

@@ -3,8 +3,10 @@
 
 #include <gtest/gtest.h>
 #include <sys/socket.h>
+#include <sys/un.h>
 
 #include <csignal>
+#include <filesystem>
 #include <future>
 #include <optional>
 #include <span>
@@ -88,6 +90,42 @@ TEST_F(LocalSocketOfALink, SaysWhyItTurnsSomebodyAway) {
               static_cast<void>(one_more.ask({"", "hosts"}));
             }),
             "too many programs ask the link at once");
+}
+
+// Of this process: the socket that listens at that path.
+int listening_at(const std::string& path) {
+  for (const auto& each : std::filesystem::directory_iterator("/proc/self/fd")) {
+    const int descriptor = std::stoi(each.path().filename().string());
+    sockaddr_un address{};
+    socklen_t size = sizeof address;
+    if (::getsockname(descriptor, reinterpret_cast<sockaddr*>(&address), &size) == 0 &&
+        address.sun_family == AF_UNIX && address.sun_path == path) {
+      return descriptor;
+    }
+  }
+  return -1;
+}
+
+// It would come back at once, and take the whole processor.
+TEST_F(LocalSocketOfALink, SaysThatItCannotLetInWhoComes) {
+  link::LocalSocket socket(
+      "here", [](const link::LocalUser&, const wire::LinkQuestion&) { return std::string("{}"); });
+  const int listening = listening_at(socket.path());
+  ASSERT_GE(listening, 0);
+  testing::internal::CaptureStderr();
+  std::string said;
+  ASSERT_EQ(::shutdown(listening, SHUT_RD), 0);  // accept() fails from now on
+  await([&] {
+    said += testing::internal::GetCapturedStderr();
+    testing::internal::CaptureStderr();
+    return said.find('\n') != std::string::npos;
+  });
+  socket.close();
+  said += testing::internal::GetCapturedStderr();
+  EXPECT_NE(said.find("a program that asks the link cannot be let in (accept: Invalid argument); "
+                      "trying again"),
+            std::string::npos)
+      << said;
 }
 
 TEST_F(LocalSocketOfALink, AnswersWhoHasAskedBeforeItCloses) {
