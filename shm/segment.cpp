@@ -70,6 +70,7 @@ FileDescriptor reopen(const FileDescriptor& segment, int flags) {
 }
 
 std::size_t checked_size(const FileDescriptor& segment, Seals wanted) {
+  if (!segment) throw std::runtime_error("the descriptor of a segment is missing");
   if (foreign_kind(segment.get()) != ForeignKind::kMemfd) {
     throw std::runtime_error("the descriptor is not a memfd");
   }

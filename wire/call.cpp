@@ -51,6 +51,11 @@ bool wait_readable(const Caller& caller, int descriptor, std::optional<milliseco
   }
 }
 
+// Of what has come: nothing of it has been lost.
+void require_descriptors(const Received& received) {
+  if (received.lost_descriptors) throw CallError(no_descriptor_left("what the daemon sends"));
+}
+
 std::string silence_text(const shm::FileDescriptor& socket, const Caller& caller,
                          Clock::time_point asked, const char* more = "") {
   return describe_daemon(socket.get(), caller.instance) + " runs, but did not answer within " +
@@ -109,6 +114,7 @@ class Joining {
     if (answer.kind == MessageKind::kRefused) {
       throw RefusedError("the daemon refuses: " + std::string(answer.text_view()));
     }
+    require_descriptors(welcome.received);
     return answer.kind == MessageKind::kWelcome;
   }
 
@@ -137,6 +143,12 @@ std::string nobody_answers(const Caller& caller, const std::string& why_not) {
          "; start one with: arbiterd --model FILE --instance " + caller.instance;
 }
 
+std::string no_descriptor_left(std::string_view what_for) {
+  return "process " + std::to_string(::getpid()) + " has no descriptor left for " +
+         std::string(what_for) +
+         ": raise RLIMIT_NOFILE (ulimit -n, LimitNOFILE= in a systemd unit)";
+}
+
 Welcome join(const Caller& caller) { return Joining(caller).run(); }
 
 Call::Call(Caller caller) : caller_(std::move(caller)), socket_(join(caller_).socket) {}
@@ -155,6 +167,7 @@ Received Call::ask(Message question, std::optional<milliseconds> limit) {
       if (answer.message.kind == MessageKind::kRefused) {
         throw RefusedError(std::string(answer.message.text_view()));
       }
+      require_descriptors(answer);
       return answer;
     }
     throw CallError(silence_text(socket_, caller_, asked));

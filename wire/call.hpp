@@ -13,6 +13,7 @@
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <string_view>
 
 #include "shm/file_descriptor.hpp"
 #include "wire/messages.hpp"
@@ -57,6 +58,9 @@ struct Welcome {
 // "no arbiterd of instance "x" answered within 300 ms (…); start one with: …". `why_not`: what was
 // wrong with each socket.
 [[nodiscard]] std::string nobody_answers(const Caller& caller, const std::string& why_not);
+
+// "process 42 has no descriptor left for …: raise RLIMIT_NOFILE (…)": of this process.
+[[nodiscard]] std::string no_descriptor_left(std::string_view what_for);
 
 // Looks for the instance's daemon and says hello. Throws CallError.
 [[nodiscard]] Welcome join(const Caller& caller);

@@ -97,6 +97,7 @@ void NodeCore::connect() {
   node_ = welcome.received.message.link;
   epoll_.reset(epoll_create1(EPOLL_CLOEXEC));
   timer_.reset(timerfd_create(CLOCK_MONOTONIC, TFD_NONBLOCK | TFD_CLOEXEC));
+  if (!epoll_ || !timer_) throw Error(wire::no_descriptor_left("the daemon's messages"));
   shm::close_in_children(epoll_);
   shm::close_in_children(timer_);
   epoll_event event{};
@@ -368,6 +369,7 @@ std::shared_ptr<InputCore> NodeCore::open_input(std::string_view name, const Typ
   check_port_name(name);
   check_bounds<std::uint32_t>(name, "depth", options.depth, 1, shm::kMaxDepth);
   check_bounds<std::uint32_t>(name, "max_held", options.max_held, 1, shm::kMaxHeld);
+  check_bounds<unsigned>(name, "when_full", static_cast<unsigned>(options.when_full), 0, 1);
   return open(name, [&](const std::shared_ptr<SharedMemory>& memory) {
     auto core = std::make_shared<InputCore>(std::string(name), type, options, memory);
     core->node = shared_from_this();
@@ -387,6 +389,7 @@ std::shared_ptr<TapCore> NodeCore::open_tap(std::string_view name, const Type& t
                                             const TapOptions& options) {
   check_port_name(name);
   check_bounds<std::uint32_t>(name, "max_held", options.max_held, 0, shm::kMaxTapHeld);
+  check_bounds<unsigned>(name, "of", static_cast<unsigned>(options.of), 0, 1);
   return open(name, [&](const std::shared_ptr<SharedMemory>&) {
     auto core =
         std::make_shared<TapCore>(std::string(name), type, options, service_bell_, residence());

@@ -127,7 +127,6 @@ class NodeCore : public std::enable_shared_from_this<NodeCore> {
   [[nodiscard]] shm::Nanoseconds next_description() const noexcept;
   void describe_again() noexcept;
   void handle(wire::Received& received);
-  [[nodiscard]] static std::string no_descriptor_left(const char* what_for);
   void handle_without_descriptors(const wire::Message& message);
   void handle_reply(wire::Received& received);
   void wake_inputs();

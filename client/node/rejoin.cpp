@@ -140,7 +140,7 @@ void NodeCore::rejoin() {
   if (!are_whole) {
     static_cast<void>(hand_back_memory(*socket, true));
     const std::lock_guard lock(mutex_);
-    turned_away_ = no_descriptor_left("its ports");
+    turned_away_ = wire::no_descriptor_left("its ports");
     ring_timer_every(kTurnedAwayInterval);
     return;
   }

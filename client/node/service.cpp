@@ -171,15 +171,10 @@ void NodeCore::tidy_ports(
   tidy_taps(copied_from);
 }
 
-std::string NodeCore::no_descriptor_left(const char* what_for) {
-  return "process " + std::to_string(getpid()) + " has no descriptor left for " + what_for +
-         ": raise RLIMIT_NOFILE (ulimit -n, LimitNOFILE= in a systemd unit)";
-}
-
 // This process has no descriptor left for what came with a message. Nothing is lost by that but
 // what the message was about.
 void NodeCore::handle_without_descriptors(const wire::Message& message) {
-  const std::string why = no_descriptor_left("what the daemon sends");
+  const std::string why = wire::no_descriptor_left("what the daemon sends");
   switch (message.kind) {
     case wire::MessageKind::kWelcome: {
       const std::lock_guard lock(mutex_);

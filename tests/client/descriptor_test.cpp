@@ -1,10 +1,16 @@
 // fd(): an input port in a loop of one's own.
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <poll.h>
 #include <sys/epoll.h>
+#include <sys/resource.h>
+#include <unistd.h>
 
 #include <chrono>
+#include <string>
 #include <thread>
+#include <utility>
+#include <vector>
 
 #include <arbiter/arbiter.hpp>
 
@@ -320,6 +326,37 @@ TEST(Descriptor, SeveralPortsWaitInOneLoop) {
       }
     }
   }
+}
+
+// Of this process, which has few of them, and one more at each try, until a node can be made.
+TEST(Descriptor, ANodeThatFindsTooFewSaysSo) {
+  Daemon daemon(single_model());
+  rlimit before{};
+  ASSERT_EQ(::getrlimit(RLIMIT_NOFILE, &before), 0);
+  const int next = ::dup(STDERR_FILENO);
+  ASSERT_GE(next, 0);
+  ::close(next);
+  std::vector<std::string> whys;
+  bool is_made = false;
+  for (int more = 1; !is_made && more < 100; ++more) {
+    const rlimit few{static_cast<rlim_t>(next + more), before.rlim_max};
+    std::string why;
+    ASSERT_EQ(::setrlimit(RLIMIT_NOFILE, &few), 0);
+    try {
+      const Node node("test", {.connect_timeout = 0ms, .service_thread = false});
+      is_made = true;
+    } catch (const Error& error) {
+      why = error.what();
+    }
+    ASSERT_EQ(::setrlimit(RLIMIT_NOFILE, &before), 0);
+    if (!is_made) whys.push_back(std::move(why));
+  }
+  EXPECT_TRUE(is_made);
+  const std::string lost = "process " + std::to_string(::getpid()) +
+                           " has no descriptor left for what the daemon sends: raise RLIMIT_NOFILE "
+                           "(ulimit -n, LimitNOFILE= in a systemd unit)";
+  EXPECT_THAT(whys, testing::Contains(lost));
+  EXPECT_THAT(whys, testing::Each(testing::Not(testing::HasSubstr("memfd"))));
 }
 
 }  // namespace

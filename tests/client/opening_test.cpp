@@ -145,6 +145,15 @@ TEST(Opening, AMalformedNameIsRefused) {
   EXPECT_THROW(Node(std::string(256, 'n')), Error);
 }
 
+TEST(Opening, ChoicesAreAmongThoseThatThereAre) {
+  Daemon daemon(single_model());
+  Node node("test");
+  EXPECT_EQ(error_of([&] { auto in = node.input_port<int>("/in", {.when_full = WhenFull(7)}); }),
+            "/in: when_full is 7, but must be from 0 to 1");
+  EXPECT_EQ(error_of([&] { auto tap = node.tap<int>("/out", {.of = TapOf(9)}); }),
+            "/out: of is 9, but must be from 0 to 1");
+}
+
 TEST(Opening, ANameOfTheGreatestLengthIsFine) {
   const std::string longest = "/" + std::string(254, 'a');
   Daemon daemon(rules(arbiter_at(longest, select(longest))));

@@ -11,6 +11,7 @@
 #include <cerrno>
 
 #include "shm/bell.hpp"
+#include "tests/support/error_of.hpp"
 
 namespace arbiter::shm {
 namespace {
@@ -106,7 +107,8 @@ TEST(Segment, OfAnotherKindOrWithoutItsSealsItIsNotTaken) {
   EXPECT_THROW(checked_size(unsealed, Seals::kOneWriter), std::runtime_error);
   const Bell bell;
   EXPECT_THROW(checked_size(bell.write_end(), Seals::kFixedSize), std::runtime_error);
-  EXPECT_THROW(checked_size(FileDescriptor(), Seals::kFixedSize), std::runtime_error);
+  EXPECT_EQ(test::error_of([] { checked_size(FileDescriptor(), Seals::kFixedSize); }),
+            "the descriptor of a segment is missing");
 }
 
 TEST(Segment, AChildDoesNotInheritAWritableMapping) {
