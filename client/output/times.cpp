@@ -92,6 +92,10 @@ void OutputCore::begin_replay(shm::Nanoseconds at, shm::Nanoseconds now) {
     throw Error(name_ + ": an arrival at " + std::to_string(at) + " ns is refused: that is " +
                 std::to_string(by) + " ns " + what);
   };
+  if (at < 0) {
+    throw Error(name_ + ": an arrival at " + std::to_string(at) +
+                " ns is refused: CLOCK_MONOTONIC begins at 0");
+  }
   if (handover_.has_offer()) accept_view();
   // Verdicts were found for times that may be later than `at`: they are forgotten.
   bind_rules_and_view();
@@ -100,8 +104,7 @@ void OutputCore::begin_replay(shm::Nanoseconds at, shm::Nanoseconds now) {
   }
   if (at > now) refuse(at - now, "later than now");
   if (at < last_) {
-    refuse(last_ - std::max(at, shm::Nanoseconds{0}),  // Time::min() is no reading of a clock
-           "before the last arrival or deactivation of this source");
+    refuse(last_ - at, "before the last arrival or deactivation of this source");
   }
   if (at == last_ && shm::is_deactivation(own_word_)) {
     refuse(0, "after the last deactivation of this source; later is allowed");

@@ -119,6 +119,18 @@ TEST(Replay, TheFutureIsRefused) {
   EXPECT_EQ(source["signals"], 0);
 }
 
+TEST(Replay, TheClockDoesNotGoBelowZero) {
+  Daemon daemon(single_model());
+  Node node("test");
+  auto out = node.output_port<Number>("/out");
+  const std::string why = "/out: an arrival at -1 ns is refused: CLOCK_MONOTONIC begins at 0";
+  EXPECT_EQ(error_of([&] { out.publish_at(Time(-1ns), Number{1}); }), why) << "nothing came before";
+  out.publish(Number{1});
+  EXPECT_EQ(error_of([&] { out.publish_at(Time(-1ns), Number{1}); }), why);
+  EXPECT_EQ(error_of([&] { out.signal_at(Time::min()); }),
+            "/out: an arrival at -9223372036854775808 ns is refused: CLOCK_MONOTONIC begins at 0");
+}
+
 TEST(Replay, TimeDoesNotGoBack) {
   Daemon daemon(single_model());
   Node node("test");

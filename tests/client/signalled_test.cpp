@@ -128,6 +128,29 @@ TEST(Signalled, ItIsNeverLate) {
       << "each loan was free";
 }
 
+// As output_port.hpp says.
+TEST(Signalled, ASecondOneIsOneMoreSampleOfTheSameArrival) {
+  Daemon daemon(single_model("1000s"));
+  Node node("test");
+  auto out = node.output_port<Number>("/out");
+  auto in = node.input_port<Number>("/in", {.max_held = 3});
+  out.signal();
+  EXPECT_EQ(out.publish_signalled(loan_with(out, 1), kAnyTime).delivered, 1U);
+  EXPECT_EQ(out.publish_signalled(loan_with(out, 2), kAnyTime).delivered, 1U);
+  const auto first = in.take();
+  const auto second = in.take();
+  ASSERT_TRUE(first && second);
+  EXPECT_EQ(second->stamp_ns(), first->stamp_ns());
+  EXPECT_EQ(first->sequence(), 1U);
+  EXPECT_EQ(second->sequence(), 2U);
+  out.publish(Number{3});
+  EXPECT_EQ(out.publish_signalled(loan_with(out, 4), kAnyTime).delivered, 1U);
+  const auto published = in.take();
+  ASSERT_TRUE(published);
+  const std::int64_t arrived = published->stamp_ns();
+  EXPECT_GT(arrived, first->stamp_ns());
+}
+
 TEST(Signalled, HoldsForBytesToo) {
   Daemon daemon(single_model());
   Node node("test");

@@ -184,6 +184,8 @@ TEST(Types, AnotherAlignmentIsRefused) {
 
 TEST(Types, ANameThatIsGivenIsTheTypes) {
   EXPECT_EQ(type_of<Twist>(), Type("geometry/Twist", 48, 8));
+  EXPECT_EQ(type_of<const Twist>(), type_of<Twist>());
+  EXPECT_EQ(type_of<const volatile Twist>(), type_of<Twist>());
   EXPECT_EQ(type_of<Pair>().name(), "Paar \u00e4\u00f6\u00fc");
   EXPECT_EQ(type_of<Number>(), Type("arbiter::test::Number", 8, 8)) << "as the compiler writes it";
   EXPECT_NE(type_of<Twist>(), type_of<NewTwist>());

@@ -30,7 +30,9 @@ namespace arbiter {
 class Node {
  public:
   // Blocks until a daemon of the instance answers, at most options.connect_timeout; then throws
-  // arbiter::Error. `name` is for people to read; several nodes may share one.
+  // arbiter::Error. `name` is for people to read; several nodes may share one. It is 1 to 255 bytes
+  // of UTF-8, without white space, double quotes, and control or invisible characters; and so is
+  // the name of a port, which begins with '/'. Throws arbiter::Error if it is not.
   explicit Node(std::string_view name, const NodeOptions& options = {})
       : core_(detail::make_node(name, options)) {}
   // Copies belong to one component: it stays connected until the last copy and the last port go.

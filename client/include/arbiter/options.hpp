@@ -67,7 +67,10 @@ struct OutputPortOptions {
   std::uint32_t max_loans = 2;
   // The most memory, in bytes, that this port's samples may take up. Each sample takes a multiple
   // of 64 bytes; at least max_loans + 3 must fit. Memory is taken as input ports connect: each
-  // needs its depth and its max_held. A port that does not fit gets a smaller depth.
+  // needs its depth and its max_held. A port for which not all of its depth is left gets a smaller
+  // queue, of one sample at least (`arbiter status --json` has its `depth`, and `arbiter why` says
+  // so where samples are lost). One for which not even that is left is not connected; a notice to
+  // both (NoticeKind::refused), `arbiter status` and `arbiter why` say so.
   std::size_t max_memory = std::size_t{1} << 30;
   // Whether the port gives way to a component that opens a port of the same name. It is for
   // programs that stand in for a component while there is none, such as arbiter-link; any program

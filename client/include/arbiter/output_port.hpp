@@ -148,6 +148,9 @@ class OutputPortBase {
 
 template <class T>
 class OutputPort : public OutputPortBase {
+  static_assert(std::is_same_v<T, std::remove_cv_t<T>>,
+                "an output port writes its samples: give its type without const and volatile");
+
  public:
   // Memory for a sample; empty if max_loans are out. Not zeroed. Wait-free.
   [[nodiscard]] std::optional<Loan<T>> loan() noexcept {
@@ -194,8 +197,10 @@ class OutputPort : public OutputPortBase {
   // wanted (wants_samples()). It is no arrival: the source's activity stays as it was. The sample
   // bears the time of the signal(), is decided for that time, as publish_at() is, and is handed to
   // the ports where the source wins. If `deadline` has passed, or the source is not active any
-  // more, the outcome says `late`, and nothing happens. Throws as publish(). Wait-free; but each
-  // call binds the rules again.
+  // more, the outcome says `late`, and nothing happens. Call it once at most after each signal(),
+  // with no publish() in between: nothing counts that. A second call, or one after a publish(),
+  // hands over one more sample, which has the next sequence number and the time of that arrival.
+  // Throws as publish(). Wait-free; but each call binds the rules again.
   Outcome publish_signalled(Loan<T> loan, Time deadline, Origin origin = {}) {
     require_own(loan);
     return detail::publish_signalled(*core_, release(loan), sizeof(T), deadline, origin);
@@ -208,12 +213,13 @@ class OutputPort : public OutputPortBase {
   // call comes. If an arrival at another time, such as a live one, has come in between, it is
   // decided for the time of the call.
   //
-  // Throws arbiter::Error if `at` is later than now, before the last arrival or deactivation of
-  // this source, or at the time of a deactivation; or if the daemon's policy did not allow this
-  // user to `replay` this source when the port was opened. Then there is no arrival, and a loan is
-  // free again. The policy protects against mistakes only: a component writes the activity of its
-  // own source, so a user who may open it can pretend any arrival. Wait-free; but each call binds
-  // the rules again, which publish() does only after another model has come into force.
+  // Throws arbiter::Error if `at` is below 0, later than now, before the last arrival or
+  // deactivation of this source, or at the time of a deactivation; or if the daemon's policy did
+  // not allow this user to `replay` this source when the port was opened. Then there is no arrival,
+  // and a loan is free again. The policy protects against mistakes only: a component writes the
+  // activity of its own source, so a user who may open it can pretend any arrival. Wait-free; but
+  // each call binds the rules again, which publish() does only after another model has come into
+  // force.
   Outcome publish_at(Time at, Loan<T> loan) {
     require_own(loan);
     return detail::publish_at(*core_, at, release(loan), sizeof(T));

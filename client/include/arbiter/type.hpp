@@ -21,11 +21,20 @@
 // without a name of its own has the name that the compiler writes, with its namespaces
 // ("robot::Twist", demangled as GCC and Clang do it; beyond 239 bytes, a hash of the whole replaces
 // its end). Programs that are built alike may rely on that. Name the types that others feed or
-// read: a script, a gateway, another language, another standard library.
+// read: a script, a gateway, another language, another standard library. Without RTTI (-fno-rtti)
+// each needs a name.
 //
 // Threads: a Type is a value. Blocking: none. Cost: a copy may allocate; nothing here is on the
 // data path.
 #pragma once
+
+#ifndef __cpp_exceptions
+#error "arbiter reports errors by exceptions: compile without -fno-exceptions"
+#endif
+// It changes the layout of containers, which program and library hand each other.
+#if defined(_GLIBCXX_DEBUG) && !defined(ARBITER_HAS_GLIBCXX_DEBUG)
+#error "arbiter's library has no _GLIBCXX_DEBUG: build both with it and ARBITER_HAS_GLIBCXX_DEBUG"
+#endif
 
 #include <cstddef>
 #include <string>
@@ -109,18 +118,26 @@ constexpr bool may_be_type_name(std::string_view name) noexcept {
 
 }  // namespace detail
 
-// T as its ports declare it. Throws arbiter::Error if its given name is not a proper one.
+// T as its ports declare it; const T is the same. Throws arbiter::Error if its given name is not a
+// proper one.
 template <class T>
 [[nodiscard]] Type type_of() {
+  using Plain = std::remove_cv_t<T>;
   static_assert(
       std::is_trivially_copyable_v<T>,
       "a sample is read in place by other processes: its type must be trivially copyable");
   static_assert(!std::is_pointer_v<T>, "a pointer means nothing in another process");
   static_assert(alignof(T) <= 4096, "samples are aligned to at most a page");
-  if constexpr (TypeName<T>::value.empty()) {
-    return detail::type_of_cpp(typeid(T).name(), sizeof(T), alignof(T));
+  if constexpr (TypeName<Plain>::value.empty()) {
+#ifdef __cpp_rtti
+    return detail::type_of_cpp(typeid(Plain).name(), sizeof(T), alignof(T));
+#else
+    static_assert(!TypeName<Plain>::value.empty(),
+                  "without RTTI (-fno-rtti) a type has no name of the compiler's: give it one with "
+                  "ARBITER_TYPE");
+#endif
   } else {
-    return Type(TypeName<T>::value, sizeof(T), alignof(T));
+    return Type(TypeName<Plain>::value, sizeof(T), alignof(T));
   }
 }
 
