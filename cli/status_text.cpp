@@ -139,7 +139,7 @@ void print_connection(std::ostream& out, const wire::ConnectionStatus& connectio
                                          : "    ";
   out << mark << connection.source;
   if (connection.mismatch) {
-    out << "  MISMATCH: " << *connection.mismatch << '\n';
+    out << "  NOT CONNECTED: " << *connection.mismatch << '\n';
     return;
   }
   if (!connection.is_connected()) {

@@ -50,6 +50,23 @@ void add_outside(const std::string& name, const char* how, const auto& open,
   }
 }
 
+// Whether it is not for their types that two ports are not connected.
+bool types_fit(const std::optional<wire::SampleType>& sent,
+               const std::optional<wire::SampleType>& taken) {
+  if (!taken) return true;
+  return sent && sent->name == taken->name && sent->alignment == taken->alignment &&
+         (sent->size == taken->size || taken->alignment == 0);
+}
+
+// Why the queue has fewer places than the input port has asked for; empty: it has as many.
+std::string shorter_queue(const wire::ConnectionStatus& connection,
+                          const wire::InputStatus& input) {
+  if (!input.open || !connection.depth || *connection.depth >= input.open->depth) return {};
+  return "the queue has " + rules::counted(*connection.depth, "place") + " in place of " +
+         std::to_string(input.open->depth) + ", because max_memory of " + connection.source +
+         " leaves no more";
+}
+
 bool contains(const std::vector<std::string>& names, const std::string& name) {
   return std::find(names.begin(), names.end(), name) != names.end();
 }
@@ -202,9 +219,12 @@ std::vector<Obstacle> Obstacles::of_connection(const std::string& source) const 
   const wire::ConnectionStatus* found = connection_of(source);
   if (found == nullptr) return result;
   const wire::ConnectionStatus& connection = *found;
+  const wire::SourceStatus* output = status_.find_source(source);
   if (connection.mismatch) {
-    result.push_back(
-        {"type-mismatch", "not connected, the two ports do not fit: " + *connection.mismatch});
+    const bool fits = is_open() && output != nullptr && output->open &&
+                      types_fit(output->open->type, input_->open->type);
+    const std::string what = fits ? "not connected: " : "not connected, the two ports do not fit: ";
+    result.push_back({"type-mismatch", what + *connection.mismatch});
     return result;
   }
   const auto say = [&](std::uint64_t count, const char* code, const char* of_one,
@@ -216,12 +236,15 @@ std::vector<Obstacle> Obstacles::of_connection(const std::string& source) const 
   };
   const std::string component =
       is_open() ? "component " + component_text(*input_) : "the component";
+  const std::string shorter = shorter_queue(connection, *input_);
   // Counted from the opening of the ports on: it may be long ago.
   say(connection.refused, "refused", " has", " have",
-      " been refused since the ports were opened, because the queue was full (refuse_new)", true);
+      " been refused since the ports were opened, because the queue was full (refuse_new)" +
+          (shorter.empty() ? "" : ": " + shorter),
+      true);
   say(connection.overtaken, "overtaken", " has", " have",
-      " been lost to newer ones since the ports were opened, because " + component +
-          " took them too slowly",
+      " been lost to newer ones since the ports were opened, because " +
+          (shorter.empty() ? component + " took them too slowly" : shorter),
       true);
   // Arbitration at both ends is no fault, nor is a component that takes when it wants to.
   say(connection.dropped, "dropped", " that had been accepted was", " that had been accepted were",

@@ -150,6 +150,35 @@ TEST(Why, TellsOfSamplesThatDidNotGetThrough) {
                                       HasSubstr("since the ports were opened"))));
 }
 
+// Six samples fit: two for the publisher itself, one that the component holds, three for the queue.
+TEST(Why, TellsOfAQueueThatThePublishersMemoryMakesSmaller) {
+  Daemon daemon(kGazeModel);
+  Node node("test");
+  auto random = node.output_port<int>("/random", {.max_loans = 1, .max_memory = 6 * 64});
+  auto in = node.input_port<int>("/gaze", {.depth = 8});
+  for (int i = 0; i < 9; ++i) random.publish(i);
+  const json connected = connection(why_json({"/gaze"}), "/random");
+  EXPECT_THAT(texts(connected["obstacles"]),
+              testing::Contains(AllOf(
+                  HasSubstr("have been lost to newer ones since the ports were opened, because the "
+                            "queue has 3 places in place of 8, because max_memory of /random "
+                            "leaves no more"),
+                  Not(HasSubstr("too slowly")))));
+}
+
+TEST(Why, TellsThatThePublishersMemoryHasNoRoomForAPort) {
+  Daemon daemon(kGazeModel);
+  Node node("test");
+  auto random = node.output_port<int>("/random", {.max_loans = 1, .max_memory = 4 * 64});
+  auto in = node.input_port<int>("/gaze", {.max_held = 60});
+  EXPECT_THAT(texts(connection(why_json({"/gaze"}), "/random")["obstacles"]),
+              ElementsAre("not connected: max_memory of /random leaves no room for another input "
+                          "port"));
+  const std::string status = arbiter({"status"}).out;
+  EXPECT_THAT(status, HasSubstr("/random  NOT CONNECTED: max_memory of /random leaves no room"));
+  EXPECT_THAT(status, Not(HasSubstr("MISMATCH")));
+}
+
 TEST(Why, TellsOfComponentsThatAreStoppedAndThatHaveDied) {
   Daemon daemon(kGazeModel);
   const std::string program = std::string(ARBITER_PROGRAMS) + "/arbiter";
