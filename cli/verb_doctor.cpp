@@ -88,7 +88,10 @@ int examine(const DoctorOptions& options) {
   add(watch::examine_daemon(who, status));
   if (status) {
     add(watch::examine_processes(machine, *status));
-    if (options.root.empty()) add(watch::examine_deaths(*status));
+    if (options.root.empty()) {
+      add(watch::examine_deaths(*status));
+      add(watch::examine_ports(*status));
+    }
     ProgressLine line;
     add(watch::examine_publishers(who, *status, [&line] {
       line.show([] { return "watching how often sources arrive, for 2.5 s at most"; });

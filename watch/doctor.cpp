@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <filesystem>
 #include <map>
 #include <set>
 #include <string_view>
@@ -127,6 +128,11 @@ std::string restart_of_daemon(const std::string& instance) {
              : "end the daemon, and start it again as it was started, with --instance " + instance;
 }
 
+// Whose socket that is: "base" of "/run/arbiter/base.link".
+std::string instance_of(const std::string& socket) {
+  return std::filesystem::path(socket).stem().string();
+}
+
 class Processes {
  public:
   Processes(const Machine& machine, std::string instance, Findings& found)
@@ -237,14 +243,17 @@ Findings examine_meeting_places() {
       if (path.ends_with(".link")) {
         found.push_back(
             {"stale-socket", "nobody listens at " + path,
-             "a link was killed there: nothing crosses between this host and others",
-             "start arbiter-link of that instance, or if it is not needed any more: rm " + path});
+             "the link of instance " + instance_of(path) +
+                 " was killed there: nothing of that instance crosses between this host and others",
+             "start arbiter-link --instance " + instance_of(path) +
+                 ", or if it is not needed any more: rm " + path});
         continue;
       }
       found.push_back(
           {"stale-socket", "nobody listens at " + path,
-           "a daemon was killed there; until the next one comes, components of that "
-           "instance go on with the last model, and new ones find no daemon",
+           "the daemon of instance " + instance_of(path) +
+               " was killed there; until the next one comes, components of that instance go on "
+               "with the last model, and new ones find no daemon",
            "start the daemon of that instance, or if it is not needed any more: rm " + path});
     }
   }
@@ -347,6 +356,10 @@ const std::vector<std::string>& finding_codes() {
                                               "time-namespace",
                                               "stranger",
                                               "dead-component",
+                                              "type-mismatch",
+                                              "cannot-deliver",
+                                              "opening-refused",
+                                              "near-name",
                                               "slow-publisher",
                                               "silent-link",
                                               "link-waits",

@@ -40,6 +40,10 @@ using Findings = std::vector<Finding>;
 // Components that died, of whose ports the model wants one that nobody has open.
 [[nodiscard]] Findings examine_deaths(const wire::Status& status);
 
+// Ports that cannot do their work: connections that are refused, selected sources that cannot
+// deliver, ports that were refused, and ports whose name is probably misspelt. A few of each.
+[[nodiscard]] Findings examine_ports(const wire::Status& status);
+
 // Sources that are inactive between their arrivals, because their publishers are slower than T. The
 // daemon is asked for its memory, and activities are watched for some seconds where components have
 // sources open; meanwhile `while_looking` is called often.

@@ -49,9 +49,28 @@ TEST(Doctor, LooksWhereClientsLook) {
            finding.mend.find(daemon.socket_path()) != std::string::npos;
   };
   EXPECT_EQ(std::count_if(findings.begin(), findings.end(), is_ours), 1);
+  EXPECT_THAT(std::find_if(findings.begin(), findings.end(), is_ours)->why,
+              HasSubstr("the daemon of instance " + daemon.instance() + " was killed there"));
   daemon.restart();
   findings = watch::examine_meeting_places();
   EXPECT_EQ(std::count_if(findings.begin(), findings.end(), is_ours), 0);
+}
+
+TEST(Doctor, SaysOfWhichInstanceALinkWasKilled) {
+  const TemporaryDirectory directory;
+  const ScopedVariable session("XDG_RUNTIME_DIR", directory.path());
+  const ScopedVariable own("RUNTIME_DIRECTORY", std::nullopt);
+  fs::create_directory(directory.path() + "/arbiter");
+  const std::string link = directory.path() + "/arbiter/head.link";
+  fs::rename(wire::listen_at(directory.path() + "/arbiter", "was-a-link").path, link);
+  const Findings findings = watch::examine_meeting_places();
+  const auto found = std::find_if(findings.begin(), findings.end(), [&](const auto& each) {
+    return each.mend.find(link) != std::string::npos;
+  });
+  ASSERT_NE(found, findings.end());
+  EXPECT_THAT(found->why, AllOf(HasSubstr("the link of instance head was killed there"),
+                                HasSubstr("nothing of that instance crosses")));
+  EXPECT_THAT(found->mend, HasSubstr("arbiter-link --instance head"));
 }
 
 TEST(Doctor, DisturbsNoDaemon) {

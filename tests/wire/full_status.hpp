@@ -16,7 +16,7 @@ inline wire::Status full_status() {
   status.history = {
       {7, 5, "work", {"a.xml"}, "app.xml", 1'795'323'981'354, "reload", "robot", "none", true},
       {6, 6, "", {}, {}, -1, "start", {}, {}, false}};
-  status.deaths = {{"dead", 44, 1000, 13, {"/o"}, {"/i", "/j"}}};
+  status.deaths = {{"dead", 44, 1000, 13, {"/o"}, {"/i", "/j"}, {"/i"}}};
   status.refusals = {{"out", 47, 1000, 14, "not you", "/o", {}},
                      {"in", 48, 1001, 15, "nor you", {}, "/i"}};
   status.strangers = {{"lost", 43, 1000, "its state is gone", 11, 12, {"/o"}, {"/i", "/j"}}};
