@@ -109,6 +109,7 @@ void DdsMiddleware::start(const std::vector<OpenIn>& ins, const std::vector<Open
     add(site_of(in.gateway), *added.back(), in.account);
   }
   if (!started_) {
+    say_domains();
     latched_.clear();
     // One tick before there is a reader: see StallGuard.
     guard_.tick(shm::monotonic_now());
@@ -117,6 +118,16 @@ void DdsMiddleware::start(const std::vector<OpenIn>& ins, const std::vector<Open
   started_ = true;
   for (std::size_t i = 0; i < ins.size(); ++i) open(site_of(ins[i].gateway), *added[i]);
   tend();
+}
+
+// One that is not meant has nobody in it, and looks as if nobody ran.
+void DdsMiddleware::say_domains() const {
+  std::string all;
+  for (const auto& [id, site] : sites_) all += (all.empty() ? "" : ", ") + std::to_string(id);
+  if (all.empty()) return;
+  say(Level::kInfo, (sites_.size() == 1 ? "its topics are in DDS domain "
+                                        : "its topics are in the DDS domains ") +
+                        all);
 }
 
 void DdsMiddleware::stop() noexcept {

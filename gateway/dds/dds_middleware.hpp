@@ -54,6 +54,7 @@ class DdsMiddleware : public Middleware {
   [[nodiscard]] Site& site_of(const Gateway& gateway);
   void add(Site& site, EndPoint& end, Account& account);
   void hold_low_descriptors() noexcept;
+  void say_domains() const;
   // False: not now, and each account says why.
   bool open(Site& site);
   void open(Site& site, EndPoint& end);

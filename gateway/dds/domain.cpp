@@ -94,7 +94,9 @@ Entity open_domain(dds_domainid_t id, const Gateway& gateway) try {
 }
 
 Entity join(dds_domainid_t domain) {
-  return {dds_create_participant(domain, nullptr, nullptr),
+  const CycloneQos qos(dds_create_qos());
+  dds_qset_userdata(qos.get(), kOfGateway.data(), kOfGateway.size());
+  return {dds_create_participant(domain, qos.get(), nullptr),
           "a participant in domain " + std::to_string(domain)};
 }
 

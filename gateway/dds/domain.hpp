@@ -34,6 +34,7 @@ class Domain {
   // The participant that reads leaves. No reader is open.
   void leave_readers() noexcept { readers_ = Entity(); }
   [[nodiscard]] Peers& peers() { return peers_; }
+  [[nodiscard]] dds_domainid_t id() const { return id_; }
 
  private:
   const dds_domainid_t id_;

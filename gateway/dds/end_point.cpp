@@ -84,7 +84,8 @@ std::string EndPoint::wrong_size(std::size_t bytes) const {
 void EndPoint::look_at(const PeersOfTopic& peers) {
   if (is_open()) choose_durability();
   // Strangers may be many, and come and go: each is looked at when something has changed.
-  if (seen_ != peers.revision || why_less_durable_ != why_less_durable()) {
+  if (seen_ != peers.revision || why_less_durable_ != why_less_durable() ||
+      was_served_ != is_served()) {
     choose_kind(peers.ends);
     if (!is_open()) return;
     adopt_type_hash(peers.ends);
@@ -144,6 +145,7 @@ void EndPoint::find_obstacles(const PeersOfTopic& peers) {
   // Those that go past Arbiter come first: a status has room for a few sentences alone.
   std::vector<std::string> others;
   Warnings::Sentences warnings;
+  was_served_ = is_served();
   for (const auto& [guid, peer] : peers.ends) {
     const bool meet = may_meet(topic_.qos, peer.qos);
     if (peer.end != which_) {
@@ -153,10 +155,13 @@ void EndPoint::find_obstacles(const PeersOfTopic& peers) {
                        " of " + peer.owner + " does not match: " + joined(reasons));
       // Whoever is in another partition is probably meant to be.
       if (meet) warnings.emplace_back(guid, others.back());
-    } else if (which_ == End::kWriter && meet) {
-      obstacles_.push_back(peer.owner +
-                           " publishes there, too: what it sends reaches the subscribers past "
-                           "Arbiter");
+    } else if (which_ == End::kWriter && meet && was_served_) {
+      obstacles_.push_back(
+          peer.is_gateway
+              ? "another gateway has this topic, " + peer.owner +
+                    ": what it sends reaches the subscribers past this one"
+              : peer.owner +
+                    " publishes there, too: what it sends reaches the subscribers past Arbiter");
       warnings.emplace_back(guid, obstacles_.back());
     }
   }
@@ -172,12 +177,16 @@ void EndPoint::find_obstacles(const PeersOfTopic& peers) {
 }
 
 void EndPoint::tell_obstacles() {
+  const std::uint32_t count = matched();
   if (obstacles_.empty()) {
-    account_.set_obstacle("");
+    // Whoever is expected may be in another domain, which nobody sees from here.
+    account_.set_obstacle(
+        count > 0 ? ""
+                  : std::string(which_ == End::kReader ? "no publisher" : "no subscriber") +
+                        " matched in domain " + std::to_string(domain_->id()));
     return;
   }
   // An obstacle takes the place of the number of peers.
-  const std::uint32_t count = matched();
   std::string text;
   if (count > 0) {
     text = std::to_string(count) + (which_ == End::kReader ? " publisher" : " subscriber") +

@@ -53,6 +53,9 @@ class EndPoint {
   [[nodiscard]] virtual Durability durability() const { return entry_.dds->qos.durability; }
   // Why that is less than the mapping's: "T is not forever".
   [[nodiscard]] virtual std::string_view why_less_durable() const { return {}; }
+  // Whether its port is open here: what else is at the topic of one that is not served is for
+  // whoever serves it to say.
+  [[nodiscard]] virtual bool is_served() const { return true; }
   // How many peers Cyclone has matched.
   [[nodiscard]] virtual std::uint32_t matched() const = 0;
 
@@ -83,6 +86,7 @@ class EndPoint {
   std::string type_hash_;
   std::optional<std::uint64_t> seen_;   // the peers' revision; empty: look at them
   std::string_view why_less_durable_;   // as it was told last
+  bool was_served_ = false;             // likewise
   std::vector<std::string> obstacles_;  // who does not match, and who goes past Arbiter
   Warnings warnings_;
   Entity topic_entity_;

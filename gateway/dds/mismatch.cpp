@@ -5,6 +5,7 @@
 #include <cstdio>
 
 #include "gateway/mapping/partitions.hpp"
+#include "gateway/mapping/ros_names.hpp"
 
 namespace arbiter::gateway::dds {
 namespace {
@@ -135,6 +136,17 @@ void compare_others(Comparison& pair) {
   }
 }
 
+// In the words of the mapping: names of ROS 2 where it has them.
+std::string compare_types(const DdsTopic& ours, const std::string& theirs) {
+  const std::string its = ours.is_ros ? readable_type(theirs) : theirs;
+  std::string text =
+      "type: it has " + its + ", this entry has " + (ours.is_ros ? ours.type_written : ours.type);
+  text += "; if its type is right, write type=\"" + its + "\"";
+  // A topic of ROS 2 has no other type.
+  if (ours.is_ros && its == theirs) text += " and topic=\"" + ours.name + "\"";
+  return text;
+}
+
 }  // namespace
 
 bool may_meet(const Qos& ours, const AnnouncedQos& theirs) {
@@ -143,9 +155,7 @@ bool may_meet(const Qos& ours, const AnnouncedQos& theirs) {
 
 std::vector<std::string> mismatches(const OurEnd& ours, const Peer& peer) {
   Comparison pair(ours, peer);
-  if (peer.type != ours.topic.type) {
-    pair.add_plain("type: it has " + peer.type + ", this entry has " + ours.topic.type);
-  }
+  if (peer.type != ours.topic.type) pair.add_plain(compare_types(ours.topic, peer.type));
   if (peer.keyed != ours.keyed) {
     pair.add_plain(peer.keyed
                        ? R"(key: its type has a key, this entry's has none; write keyed="true")"

@@ -46,6 +46,7 @@ class OutTopic : public EndPoint, public Sender {
  private:
   Entity make(dds_entity_t participant, dds_entity_t topic, const ddsi_sertype* type,
               const dds_qos_t* qos) override;
+  [[nodiscard]] bool is_served() const override { return outgoing_.get() != nullptr; }
   [[nodiscard]] std::uint32_t matched() const override;
   void begin() noexcept override;
   // On Cyclone's threads.

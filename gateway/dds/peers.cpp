@@ -139,7 +139,8 @@ void Peers::look_again(End end) {
   update(lookouts_[end], end);
 }
 
-// Cyclone keeps each one until somebody takes it. Those that are there stay: owner_of() reads them.
+// Cyclone keeps each one until somebody takes it. Those that are there stay: tell_owner() reads
+// them.
 void Peers::forget_gone_participants() {
   constexpr std::uint32_t kGone =
       DDS_NOT_ALIVE_DISPOSED_INSTANCE_STATE | DDS_NOT_ALIVE_NO_WRITERS_INSTANCE_STATE;
@@ -207,30 +208,30 @@ void Peers::add(const dds_builtintopic_endpoint_t& endpoint, End end,
   peer.keyed = has_key(guid);
   peer.qos = read_announced(*endpoint.qos);
   peer.type_hash = type_hash_in(user_data(*endpoint.qos));
-  peer.owner = owner_of(endpoint);
+  tell_owner(endpoint, peer);
   topic.ends.insert_or_assign(guid, std::move(peer));
   handles_.insert_or_assign(handle, Place{&topic, guid, end});
 }
 
-std::string Peers::owner_of(const dds_builtintopic_endpoint_t& endpoint) const {
+void Peers::tell_owner(const dds_builtintopic_endpoint_t& endpoint, Peer& peer) const {
   void* sample = nullptr;
   dds_sample_info_t info{};
-  std::string result;
   const dds_return_t read = dds_read_instance(participants_.get(), &sample, &info, 1, 1,
                                               endpoint.participant_instance_handle);
   if (read == 1 && info.valid_data) {
     const auto& participant = *static_cast<const dds_builtintopic_participant_t*>(sample);
+    peer.is_gateway = user_data(*participant.qos) == kOfGateway;
     const std::string name = property(*participant.qos, "__ProcessName");
     const std::string pid = property(*participant.qos, "__Pid");
     const std::string host = property(*participant.qos, "__Hostname");
     if (!name.empty()) {
-      result = name;
-      if (!pid.empty()) result += " (pid " + pid + (host.empty() ? "" : " on " + host) + ")";
-      if (result.size() > kMaxOwner) result = result.substr(0, kMaxOwner - 3) + "...";
+      peer.owner = name;
+      if (!pid.empty()) peer.owner += " (pid " + pid + (host.empty() ? "" : " on " + host) + ")";
+      if (peer.owner.size() > kMaxOwner) peer.owner = peer.owner.substr(0, kMaxOwner - 3) + "...";
     }
   }
   if (read > 0) dds_return_loan(participants_.get(), &sample, read);
-  return result.empty() ? number_of(guid_of(endpoint.participant_key)) : result;
+  if (peer.owner.empty()) peer.owner = number_of(guid_of(endpoint.participant_key));
 }
 
 }  // namespace arbiter::gateway::dds

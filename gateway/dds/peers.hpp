@@ -12,6 +12,7 @@
 #include <map>
 #include <set>
 #include <string>
+#include <string_view>
 
 #include "gateway/core/bridge.hpp"
 #include "gateway/dds/cyclone_qos.hpp"
@@ -28,8 +29,9 @@ struct Peer {
   // Whether its type has a key. An end with and one without never match, and Cyclone says nothing.
   bool keyed = false;
   AnnouncedQos qos;
-  std::string type_hash;  // "RIHS01_…", as ROS 2 has it since Iron
-  std::string owner;      // "nav (pid 12)", or a participant's number
+  std::string type_hash;    // "RIHS01_…", as ROS 2 has it since Iron
+  std::string owner;        // "nav (pid 12)", or a participant's number
+  bool is_gateway = false;  // of Arbiter, as it says
 };
 
 // By GUID: in an order that does not change.
@@ -88,7 +90,7 @@ class Peers {
   void look_again(End end);
   void forget_gone_participants();
   void add(const dds_builtintopic_endpoint_t& endpoint, End end, dds_instance_handle_t handle);
-  [[nodiscard]] std::string owner_of(const dds_builtintopic_endpoint_t& endpoint) const;
+  void tell_owner(const dds_builtintopic_endpoint_t& endpoint, Peer& peer) const;
 
   dds_entity_t participant_;
   const Bell& bell_;
@@ -105,5 +107,7 @@ class Peers {
 // "typehash=RIHS01_…;" in what ROS 2 writes into the user data; empty: there is none that a node of
 // ROS 2 could read.
 [[nodiscard]] std::string type_hash_in(const std::string& user_data);
+// What each participant of a gateway says in its user data.
+inline constexpr std::string_view kOfGateway = "gateway=arbiter;";
 
 }  // namespace arbiter::gateway::dds

@@ -75,6 +75,7 @@ void Iceoryx::start(const std::vector<OpenIn>& ins, const std::vector<OpenOut>& 
       return &each.sender->entry() == &open.outgoing.entry();
     });
     out->outgoing = &open.outgoing;
+    out->sender->serve();
     out->had_readers = false;
   }
   if (session_ != nullptr) session_->add(ins);

@@ -335,22 +335,33 @@ void Session::look_for_refused(Outlet& out) const {
   }
 }
 
-// What does not pass the gateway can bypass it.
+// What does not pass the gateway can bypass it. Of a topic that is another gateway's here, that one
+// says so.
 void Session::look_for_strangers(Outlet& out) const {
+  if (!out.sender->is_served()) return;
   const std::string own = runtime_name(gateway_, ::getpid());
   std::vector<std::string> strangers;
+  std::vector<std::string> gateways;
   for (const std::string& runtime : port_list_->publishers_of(*out.sender->entry().iceoryx)) {
     const auto process = process_of(gateway_, runtime);
     const bool has_ended = process && ::kill(*process, 0) != 0 && errno == ESRCH;
-    if (runtime != own && !has_ended) strangers.push_back(runtime);
+    if (runtime == own || has_ended) continue;
+    (process ? gateways : strangers)
+        .push_back(process ? "pid " + std::to_string(*process) : runtime);
   }
   std::string text;
   if (!strangers.empty()) {
     text = "others publish there too, past all arbitration: " + some_of(strangers);
   }
+  if (!gateways.empty()) {
+    text += (text.empty() ? "" : "; ") + ("another gateway has this topic: " + some_of(gateways));
+  }
   if (text == std::exchange(out.strangers, text) || text.empty()) return;
-  say(Level::kWarning, out.sender->entry().outside() + ": " + text +
-                           "; let them publish to another topic, and map that one with <in>");
+  say(Level::kWarning,
+      out.sender->entry().outside() + ": " + text +
+          (strangers.empty()
+               ? "; subscribers get what both send: end one of the two, or give it another topic"
+               : "; let them publish to another topic, and map that one with <in>"));
 }
 
 void Session::tell_fault(const Outlet& out) {

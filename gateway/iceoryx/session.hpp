@@ -40,6 +40,11 @@ class ChunkSender final : public Sender {
   void drop_draft() noexcept override;
   // From the session's thread, once; the loop sees it from then on.
   void use(Publisher& publisher) noexcept { publisher_.announce(publisher); }
+  // Its port is open here: else who serves it says what else is at the topic. The loop.
+  void serve() noexcept { is_served_.store(true, std::memory_order_relaxed); }
+  [[nodiscard]] bool is_served() const noexcept {
+    return is_served_.load(std::memory_order_relaxed);
+  }
   // What is wrong with the publisher, or with who else is at the topic; empty: nothing. From the
   // session's thread. What the account says is for the loop to write, which knows what is wrong
   // with RouDi.
@@ -60,7 +65,8 @@ class ChunkSender final : public Sender {
   const Entry& entry_;
   Account& account_;
   Announced<Publisher> publisher_;
-  mutable std::mutex mutex_;  // of the next one
+  std::atomic<bool> is_served_{false};  // relaxed is enough: a flag by itself
+  mutable std::mutex mutex_;            // of the next one
   std::string fault_;
   void* draft_ = nullptr;  // of whoever has the entry's turn
 };

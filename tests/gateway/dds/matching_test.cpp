@@ -64,8 +64,8 @@ TEST_P(DdsMatching, AnotherTypeIsNamedWithBothNames) {
   const DdsGateway gateway(daemon, domain, kNavIn);
   const Stranger navigation(GetParam(), domain, {"pub", "bool", "rt/cmd_vel_nav"});
   gateway.see(
-      "does not match: type: it has std_msgs::msg::dds_::Bool_, this entry has "
-      "geometry_msgs::msg::dds_::Twist_");
+      "does not match: type: it has std_msgs/msg/Bool, this entry has geometry_msgs/msg/Twist; if "
+      "its type is right, write type=\"std_msgs/msg/Bool\"");
 }
 
 TEST_P(DdsMatching, AKeyThatTheMappingDeniesIsNamed) {
@@ -154,6 +154,27 @@ TEST_P(DdsMatching, WhoeverPublishesPastArbiterIsWarnedOfAtOnce) {
   EXPECT_THAT(gateway.log(), ::testing::Not(::testing::HasSubstr("past Arbiter")));
   Stranger intruder(GetParam(), domain, {"pub", "twist", "rt/cmd_vel"});
   gateway.see("publishes there, too: what it sends reaches the subscribers past Arbiter");
+}
+
+TEST(DdsMatchingOfGateways, TheDomainIsSaidWhereNobodyIsInIt) {
+  const OwnDomain domain;
+  Daemon daemon(base_model("1s"));
+  const DdsGateway gateway(daemon, domain, kNavIn + kBaseOut + "/>");
+  const std::string number = std::to_string(domain.number());
+  gateway.see("its topics are in DDS domain " + number);
+  await_described(daemon, "/Nav/cmd_vel:o", "no publisher matched in domain " + number);
+  await_described(daemon, "/Base/cmd_vel:i", "no subscriber matched in domain " + number);
+}
+
+TEST(DdsMatchingOfGateways, AnotherGatewayIsKnownAsOne) {
+  const OwnDomain domain;
+  const Daemon daemon(base_model("1s"));
+  const DdsGateway gateway(daemon, domain, kBaseOut + "/>");
+  gateway.see("serves 0 topics in, 1 out");  // before others are where it looks for its daemon
+  const Daemon other_daemon(base_model("1s"));
+  const DdsGateway other(other_daemon, domain, kBaseOut + "/>");
+  gateway.see("another gateway has this topic, arbiter-gateway-dds (pid ");
+  other.see("another gateway has this topic, arbiter-gateway-dds (pid ");
 }
 
 // A status has room for a few sentences: none that a stranger can make long may stand before it.

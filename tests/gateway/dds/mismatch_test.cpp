@@ -72,6 +72,22 @@ TEST(Mismatch, PoliciesThatNoAttributeChangesAreNamedToo) {
                   "source time"));
 }
 
+TEST(Mismatch, TypesOfRos2HaveTheNamesThatTheMappingGivesThem) {
+  DdsTopic ours = topic();
+  ours.is_ros = true;
+  ours.type = "geometry_msgs::msg::dds_::Twist_";
+  ours.type_written = "geometry_msgs/msg/Twist";
+  Peer other = peer(End::kWriter);
+  other.type = "std_msgs::msg::dds_::Bool_";
+  EXPECT_THAT(mismatches({End::kReader, ours, false}, other),
+              ElementsAre("type: it has std_msgs/msg/Bool, this entry has geometry_msgs/msg/Twist; "
+                          "if its type is right, write type=\"std_msgs/msg/Bool\""));
+  other.type = "robot::Pose";
+  EXPECT_THAT(mismatches({End::kReader, ours, false}, other),
+              ElementsAre("type: it has robot::Pose, this entry has geometry_msgs/msg/Twist; if "
+                          "its type is right, write type=\"robot::Pose\" and topic=\"rt/t\""));
+}
+
 // Numbers of a kind that no release knows are a stranger's, too.
 TEST(Mismatch, ValuesThatNobodyKnowsAreSaidToBeUnknown) {
   Peer reader = peer(End::kReader);
@@ -95,8 +111,10 @@ TEST(Mismatch, TypesAndKeysAreCompared) {
   Peer writer = peer(End::kWriter);
   writer.type = "U";
   writer.keyed = true;
-  EXPECT_THAT(mismatches({End::kReader, topic(), false}, writer),
-              ElementsAre("type: it has U, this entry has T", HasSubstr("write keyed=\"true\"")));
+  EXPECT_THAT(
+      mismatches({End::kReader, topic(), false}, writer),
+      ElementsAre("type: it has U, this entry has T; if its type is right, write type=\"U\"",
+                  HasSubstr("write keyed=\"true\"")));
 }
 
 // Names without end are not all looked at: any may be among the others.

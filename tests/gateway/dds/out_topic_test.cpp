@@ -43,6 +43,7 @@ class Latched : public ::testing::Test {
     topic_->open(*domain_);
   }
   [[nodiscard]] const Entry& entry() const { return read_->entry(); }
+  [[nodiscard]] const Account& account() const { return *account_; }
   Sender::Result send(const std::string& bytes) {
     return topic_->send(Bytes(reinterpret_cast<const std::byte*>(bytes.data()), bytes.size()));
   }
@@ -96,6 +97,19 @@ class Latched : public ::testing::Test {
   std::optional<Account> account_;
   std::optional<Domain> domain_;
 };
+
+// Its port is another gateway's, say: that one tells who else is at the topic.
+TEST_F(Latched, OfATopicThatIsNotServedNobodyIsSaidToGoPastArbiter) {
+  make("");
+  PeersOfTopic peers;
+  Peer& other = peers.ends[Guid{1}];
+  other.end = End::kWriter;
+  other.type = entry().dds->type;
+  other.owner = "nav (pid 12)";
+  other.qos = announced_by(Qos{}, End::kWriter);
+  topic_->look_at(peers);
+  EXPECT_THAT(account().text(), testing::Not(testing::HasSubstr("past Arbiter")));
+}
 
 TEST_F(Latched, WhatWasSentLastIsStillThereWhenTheWriterIsOpenedAgain) {
   make("qos='latched'");

@@ -204,6 +204,26 @@ TEST_F(Iceoryx, WhoElsePublishesWhereTheGatewayDoesIsTold) {
   wait_until([&] { return described_input("/Base:i").find(name) == std::string::npos; });
 }
 
+// The second one has no port: it says nothing of the first, nor of others, until it serves the
+// topic.
+TEST_F(Iceoryx, OfTwoGatewaysTheOneThatServesATopicSaysWhoElseHasIt) {
+  const Roudi roudi(directory_);
+  Spoken first = gateway(directory_, out("/Base:i", "base"));
+  ASSERT_TRUE(first.hear("serves 0 topics in, 1 out"));
+  Spoken second = gateway(directory_, out("/Base:i", "base"));
+  ASSERT_TRUE(second.hear("/Base:i is not served"));
+  ASSERT_TRUE(first.hear("another gateway has this topic: pid "));
+  const Spoken stranger = plain_publisher("base");
+  ASSERT_TRUE(first.hear("others publish there too"));
+  first.process.signal(SIGTERM);
+  ASSERT_TRUE(second.hear("/Base:i is served now"));
+  const std::size_t before = second.heard.size();
+  ASSERT_TRUE(second.hear("others publish there too"));
+  EXPECT_THAT(second.heard.substr(0, before),
+              testing::Not(testing::HasSubstr("others publish there too")));
+  EXPECT_THAT(second.heard, testing::Not(testing::HasSubstr("another gateway")));
+}
+
 // RouDi tells nobody.
 TEST_F(Iceoryx, ASubscriberThatAsksForWhatTheGatewayDoesNotOfferIsNamed) {
   const Roudi roudi(directory_);
