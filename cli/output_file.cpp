@@ -28,6 +28,8 @@ void write_to(const std::string& path, const std::string& content) {
   }
 }
 
+bool is_standard_output(const std::string& path) { return path.empty() || path == "-"; }
+
 // A terminal may well be read and written.
 bool is_one_regular_file(const std::string& path, const std::string& other) {
   struct stat one {};
@@ -40,7 +42,7 @@ bool is_one_regular_file(const std::string& path, const std::string& other) {
 
 void require_no_input(const std::string& option, const std::string& output,
                       const std::string& input) {
-  if (!is_one_regular_file(output, input)) return;
+  if (is_standard_output(output) || !is_one_regular_file(output, input)) return;
   throw rules::FileError(option + ' ' + output + " would overwrite " +
                          (input == output ? "the input" : input + ", an input") +
                          "; nothing was written: give another file");
@@ -57,10 +59,14 @@ void require_two_files(const std::string& option, const std::string& output,
                        const std::string& other_option, const std::string& other) {
   namespace fs = std::filesystem;
   std::error_code unknown;
+  const bool is_any_standard_output = is_standard_output(output) || is_standard_output(other);
   // Neither need be there yet.
-  const bool is_one = is_one_regular_file(output, other) ||
-                      (!fs::exists(output, unknown) && fs::weakly_canonical(output, unknown) ==
-                                                           fs::weakly_canonical(other, unknown));
+  const bool is_one =
+      is_any_standard_output
+          ? is_standard_output(output) && is_standard_output(other)
+          : is_one_regular_file(output, other) ||
+                (!fs::exists(output, unknown) &&
+                 fs::weakly_canonical(output, unknown) == fs::weakly_canonical(other, unknown));
   if (!is_one) return;
   throw rules::FileError(option + ' ' + output + " and " + other_option + ' ' + other +
                          " are one file; nothing was written: give another file");
@@ -68,14 +74,14 @@ void require_two_files(const std::string& option, const std::string& output,
 
 void require_new_file(const std::string& output, const std::string& how) {
   std::error_code unknown;
-  if (!std::filesystem::is_regular_file(output, unknown)) return;
+  if (is_standard_output(output) || !std::filesystem::is_regular_file(output, unknown)) return;
   throw rules::FileError(output + " is there already; nothing was written: give another file, or " +
                          how);
 }
 
 void write_output(const std::string& path, const std::string& content) {
   namespace fs = std::filesystem;
-  if (path.empty()) {
+  if (is_standard_output(path)) {
     std::cout << content;
     return;
   }

@@ -21,11 +21,11 @@ void require_two_files(const std::string& option, const std::string& output,
 // `how` says how to write it all the same.
 void require_new_file(const std::string& output, const std::string& how);
 
-// Whoever reads the file sees the old content or the new one, never a part. What is no regular file
+// To standard output where `path` is empty or "-".
+// Whoever reads a file sees the old content or the new one, never a part. What is no regular file
 // is written as it is. Throws rules::FileError.
 void write_output(const std::string& path, const std::string& content);
 
-// To the file if there is one, else to standard output.
-inline constexpr const char* kOutputHelp = "File to write; without it, standard output";
+inline constexpr const char* kOutputHelp = "File to write; without it, or with -, standard output";
 
 }  // namespace arbiter::cli

@@ -167,7 +167,9 @@ void check_gateways(const CheckOptions& options, const rules::RuleSet* model,
     mappings.push_back(gateway::read_mapping_file(path, of_mappings));
   }
   if (!of_mappings.has_errors()) {
-    diagnostics.silence_about("never-published", published_by(mappings));
+    const std::set<std::string> published = published_by(mappings);
+    diagnostics.silence_about("never-published", published);
+    diagnostics.silence_about("never-read", published);  // it is declared for its T
     gateway::check_mappings(mappings, model, of_mappings);
     if (model != nullptr && model->texts->application) {
       const rules::FileText& text = *model->texts->application;

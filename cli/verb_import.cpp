@@ -106,7 +106,13 @@ void require_other_files(const ImportVerbOptions& options) {
     require_no_input("--output", options.output, input);
     require_no_input("--mapping", options.mapping, input);
   }
-  if (options.output.empty() || options.mapping.empty()) return;
+  if (options.mapping.empty()) return;
+  if (options.mapping == "-" && options.output.empty()) {
+    throw rules::FileError(
+        "--mapping - is standard output, where the model goes without --output; nothing was "
+        "written: give one of them a file");
+  }
+  if (options.output.empty()) return;
   require_two_files("--output", options.output, "--mapping", options.mapping);
 }
 
@@ -141,7 +147,7 @@ int import(ImportVerbOptions options) {
   if (diagnostics.has_errors()) {
     return say_problems(has_mapping ? problems_of_way_out(*plan, options.mapping) : Problems{});
   }
-  const std::string name = options.output.empty()
+  const std::string name = options.output.empty() || options.output == "-"
                                ? "model.xml"
                                : std::filesystem::path(options.output).filename().string();
   const std::string model = importing::write_model(*plan);
@@ -193,7 +199,7 @@ importing::IdleChoice idle_of(const std::string& word) {
 
 void add_outputs(CLI::App& verb, ImportVerbOptions& options) {
   auto* output = verb.add_option("-o,--output", options.output,
-                                 "File for the model; without it, standard output");
+                                 "File for the model; without it, or with -, standard output");
   output->type_name("FILE");
   auto* mapping = verb.add_option("--mapping", options.mapping,
                                   "File for the mapping of topics to ports; without it, none");

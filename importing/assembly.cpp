@@ -41,10 +41,7 @@ Assembly::Assembly(const NodeParameters& parameters, const ImportOptions& option
 std::string Assembly::topic_of(const MuxEntry& entry) {
   const auto topic = resolve_topic(entry.topic.value, node_, relative_);
   if (!topic) {
-    diagnostics_.error("invalid-topic", entry.topic.where,
-                       rules::quote(entry.topic.value) +
-                           " is not a name of a topic; write letters, digits and _ between "
-                           "slashes, such as /robot/joy_vel, at most 200 in all");
+    diagnostics_.error("invalid-topic", entry.topic.where, problem_of_topic(entry.topic.value));
     return "";
   }
   const auto [earlier, is_new] = topics_.emplace(*topic, entry.topic.where);

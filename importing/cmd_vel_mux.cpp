@@ -28,6 +28,19 @@ namespace {
 
 constexpr std::int64_t kLargestPriority = 4294967295;
 
+std::string problem_of_input_timeout(shm::Nanoseconds timeout) {
+  if (timeout > 0) return "";
+  return "with " + in_seconds(timeout) +
+         " an input loses the mux as soon as it has it; write how long a command counts, such as "
+         "0.5";
+}
+
+std::string problem_of_input_priority(std::int64_t priority) {
+  if (priority >= 0 && priority <= kLargestPriority) return "";
+  return "cmd_vel_mux refuses " + std::to_string(priority) +
+         "; write a number from 0 to 4294967295";
+}
+
 class CmdVelMuxImport {
  public:
   CmdVelMuxImport(const std::vector<InputFile>& files, const ImportOptions& options,
@@ -47,7 +60,10 @@ class CmdVelMuxImport {
       if (!diagnostics_.has_errors()) report_nothing(parameters_.sets().front().parameters->where);
       return {};
     }
-    inputs_ = read_entries(*parameter, {"cmd_vel_mux", true, parameters_.is_ros2()}, diagnostics_);
+    EntryRules rules{"cmd_vel_mux", true, parameters_.is_ros2()};
+    rules.problem_of_timeout = problem_of_input_timeout;
+    rules.problem_of_priority = problem_of_input_priority;
+    inputs_ = read_entries(*parameter, rules, diagnostics_);
     if (inputs_.empty() && !diagnostics_.has_errors()) report_nothing(parameter->entry->key.where);
     read_other_parameters();
     std::stable_sort(inputs_.begin(), inputs_.end(), [](const MuxEntry& a, const MuxEntry& b) {
@@ -103,7 +119,6 @@ class CmdVelMuxImport {
 
   void plan_input(std::size_t i) {
     const MuxEntry& entry = inputs_[i];
-    check_numbers(entry);
     check_equal(i);
     Command command;
     command.name = assembly_.behaviour_of(entry);
@@ -119,20 +134,6 @@ class CmdVelMuxImport {
     diagnostics_.warning("no-description", entry.where,
                          "cmd_vel_mux does not start where " + rules::quote(entry.name) +
                              " has no short_desc; the model needs none: nothing to do");
-  }
-
-  void check_numbers(const MuxEntry& entry) {
-    if (entry.timeout.value <= 0) {
-      diagnostics_.error("invalid-timeout", entry.timeout.where,
-                         "timeout: with " + in_seconds(entry.timeout.value) +
-                             " an input loses the mux as soon as it has it; write how long a "
-                             "command counts, such as 0.5");
-    }
-    if (entry.priority.value < 0 || entry.priority.value > kLargestPriority) {
-      diagnostics_.error("invalid-priority", entry.priority.where,
-                         "priority: cmd_vel_mux refuses " + std::to_string(entry.priority.value) +
-                             "; write a number from 0 to 4294967295");
-    }
   }
 
   void check_equal(std::size_t i) {

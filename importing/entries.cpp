@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "importing/numbers.hpp"
+#include "importing/topic_names.hpp"
 #include "rules/text/names.hpp"
 #include "shm/limits.hpp"
 #include "shm/utf8.hpp"
@@ -93,9 +94,14 @@ class EntryReader {
     const YamlEntry* found = require(map, entry, "topic");
     if (found == nullptr) return false;
     entry.topic = {found->value.text, found->value.where};
-    if (found->value.is_scalar() && !found->value.text.empty()) return true;
-    error("wrong-type", found->value.where, "a topic is a name, such as /cmd_vel_nav; write one");
-    return false;
+    if (!found->value.is_scalar() || found->value.text.empty()) {
+      error("wrong-type", found->value.where, "a topic is a name, such as /cmd_vel_nav; write one");
+      return false;
+    }
+    // Below any node: its own name may make a longer one of it than there may be.
+    const auto topic = resolve_topic(entry.topic.value, {"/", "mux"}, Relative::kToNamespace);
+    if (!topic) error("invalid-topic", found->value.where, problem_of_topic(entry.topic.value));
+    return topic.has_value();
   }
 
   bool read_timeout(const YamlNode& map, MuxEntry& entry) {
@@ -104,6 +110,10 @@ class EntryReader {
     const auto seconds = read_seconds(found->value);
     if (!seconds.value) {
       error("invalid-timeout", found->value.where, "timeout: " + seconds.problem);
+      return false;
+    }
+    if (const auto problem = rules_.problem_of_timeout(*seconds.value); !problem.empty()) {
+      error("invalid-timeout", found->value.where, "timeout: " + problem);
       return false;
     }
     entry.timeout = {*seconds.value, found->value.where};
@@ -124,6 +134,10 @@ class EntryReader {
     const auto number = read_integer(found->value);
     if (!number.value) {
       error("invalid-priority", found->value.where, "priority: " + number.problem);
+      return false;
+    }
+    if (const auto problem = rules_.problem_of_priority(*number.value); !problem.empty()) {
+      error("invalid-priority", found->value.where, "priority: " + problem);
       return false;
     }
     entry.priority = {*number.value, found->value.where};

@@ -34,6 +34,12 @@ struct EntryRules {
   std::string program;           // "twist_mux", for messages
   bool has_description = false;  // short_desc
   bool wants_fraction = true;    // refuses a timeout that is written as a whole number
+  // What it does not take of what is a number, and what to do; empty: nothing. Here, so that all
+  // that is wrong with an entry is said at once.
+  std::string (*problem_of_timeout)(shm::Nanoseconds) = [](shm::Nanoseconds) {
+    return std::string();
+  };
+  std::string (*problem_of_priority)(std::int64_t) = [](std::int64_t) { return std::string(); };
 };
 
 // Those of a parameter that has been found: a list, each with its name in it, as in ROS 1, or a map

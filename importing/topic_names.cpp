@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "rules/text/names.hpp"
+
 namespace arbiter::importing {
 namespace {
 
@@ -52,6 +54,12 @@ std::optional<std::string> resolve_topic(std::string_view written, const NodeNam
   }
   if (!is_absolute(name)) return {};
   return name;
+}
+
+std::string problem_of_topic(std::string_view written) {
+  return rules::quote(written) +
+         " is not a name of a topic; write letters, digits and _ between slashes, such as "
+         "/robot/joy_vel, at most 200 in all";
 }
 
 }  // namespace arbiter::importing

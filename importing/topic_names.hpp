@@ -21,5 +21,7 @@ enum class Relative { kToNamespace, kToNode };
 // "/robot/joy_vel" of "joy_vel"; nothing if that is no name of a topic.
 std::optional<std::string> resolve_topic(std::string_view written, const NodeName& node,
                                          Relative relative);
+// What to say of one that is none.
+std::string problem_of_topic(std::string_view written);
 
 }  // namespace arbiter::importing

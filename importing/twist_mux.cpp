@@ -39,6 +39,11 @@ std::string rank_of(const MuxEntry& entry) {
   return "priority " + std::to_string(entry.priority.value);
 }
 
+std::string problem_of_priority(std::int64_t priority) {
+  if (priority <= kLargestInt && priority >= -kLargestInt) return "";
+  return std::to_string(priority) + " is too large; write a number from 1 to 255";
+}
+
 class TwistMuxImport {
  public:
   TwistMuxImport(const std::vector<InputFile>& files, const ImportOptions& options,
@@ -84,7 +89,9 @@ class TwistMuxImport {
   std::vector<MuxEntry> entries_of(const char* name) {
     const auto parameter = parameters_.find(name, diagnostics_);
     if (!parameter) return {};
-    return read_entries(*parameter, {"twist_mux", false, true}, diagnostics_);
+    EntryRules rules{"twist_mux", false, true};
+    rules.problem_of_priority = problem_of_priority;
+    return read_entries(*parameter, rules, diagnostics_);
   }
 
   void read_other_parameters() {
@@ -120,12 +127,6 @@ class TwistMuxImport {
 
   void clamp(MuxEntry& entry) {
     const std::int64_t written = entry.priority.value;
-    if (written > kLargestInt || written < -kLargestInt) {
-      diagnostics_.error(
-          "invalid-priority", entry.priority.where,
-          "priority: " + std::to_string(written) + " is too large; write a number from 1 to 255");
-      return;
-    }
     entry.priority.value = std::clamp<std::int64_t>(written, 0, kHighestPriority);
     if (entry.priority.value == written) return;
     diagnostics_.warning("priority-clamped", entry.priority.where,

@@ -49,7 +49,10 @@ class MappingCheck {
     for (const Mapping& mapping : mappings) {
       for (const Gateway& gateway : mapping.gateways) {
         gateways_.push_back(&gateway);
-        for (const Entry& entry : gateway.entries) entries_.push_back({&gateway, &entry});
+        for (const Entry& entry : gateway.entries) {
+          // What it lacks, because it was refused, would seem to be wrong, too.
+          if (!entry.has_errors) entries_.push_back({&gateway, &entry});
+        }
       }
     }
   }
@@ -220,10 +223,17 @@ class MappingCheck {
       diagnostics_.warning(
           "unmentioned-port", port->where,
           "the model does not mention " + rules::quote(port->name) + ", so that " +
-              (entry.is_in() ? "nothing of it is delivered" : "nothing comes of it") +
+              what_comes_of(entry) +
               rules::advise(port->name, candidates, "correct the name, or connect it in the model"),
           {.ports = {port->name}});
     }
+  }
+
+  // Of one that the model does not mention.
+  static const char* what_comes_of(const Entry& entry) {
+    if (entry.is_in()) return "nothing of it is delivered";
+    return entry.idle.kind == Idle::Kind::kNothing ? "nothing comes of it"
+                                                   : "nothing but the idle sample comes of it";
   }
 
   // A Boolean that nobody repeats must not stay true for ever: where a condition asks for it, its

@@ -7,6 +7,13 @@ namespace {
 
 // The common types of ROS 2 have fields of one kind each.
 bool check_kind(Attributes& attributes, const SampleShape& shape, const Choice& choice) {
+  if (shape.is_dds && shape.type == "std_msgs/msg/Empty") {
+    attributes.error("invalid-value", "type",
+                     "a " + shape.type +
+                         " says nothing, so that nothing in it can choose between two sources; "
+                         "write port=\"…\" in place of the two, or map a topic of another type");
+    return false;
+  }
   const bool is_boolean = choice.field == Field::kBoolean;
   if (is_boolean && attributes.has("above")) return false;  // the field was refused
   const Field known = shape.is_dds ? field_of(shape.type).value_or(choice.field) : choice.field;

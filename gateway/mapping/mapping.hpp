@@ -125,6 +125,7 @@ struct Idle {
 struct Entry {
   enum class Direction { kIn, kOut } direction = Direction::kIn;
   rules::Location where;
+  bool has_errors = false;  // what was refused is not in it
   // Of `in`, exactly one of these two.
   std::optional<Port> port;
   std::optional<Choice> choice;

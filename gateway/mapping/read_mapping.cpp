@@ -97,6 +97,7 @@ class MappingReader {
     }
     reader_.check_no_text(element.first_child);
     const EntryContext context{*kind, directory_, read_file_};
+    bool is_other_kind = false;
     for (const XmlNode& child : Elements(element.first_child)) {
       if (child.text != "in" && child.text != "out") {
         reader_.report_unknown_element(child, {"in", "out"});
@@ -110,11 +111,41 @@ class MappingReader {
         }
         continue;
       }
+      if (const auto attribute = attribute_of_other_kind(child, *kind); !attribute.empty()) {
+        if (!std::exchange(is_other_kind, true)) refuse_other_kind(child, attribute, *kind);
+        continue;  // what else is wrong with it follows from that
+      }
+      const std::size_t errors = diagnostics_.count(rules::Severity::kError);
       if (auto entry = read_entry(reader_, child, context)) {
+        entry->has_errors = diagnostics_.count(rules::Severity::kError) != errors;
         gateway.entries.push_back(std::move(*entry));
       }
     }
     mapping_.gateways.push_back(std::move(gateway));
+  }
+
+  // What names its topic, if that is how the other kind does it.
+  static std::string_view attribute_of_other_kind(const XmlNode& entry, Kind kind) {
+    const std::string_view own = kind == Kind::kDds ? "topic" : "service";
+    const std::string_view other = kind == Kind::kDds ? "service" : "topic";
+    using rules::ElementReader;
+    const bool is_other =
+        ElementReader::has_attribute(entry, other) && !ElementReader::has_attribute(entry, own);
+    return is_other ? other : std::string_view();
+  }
+
+  // Of the first such entry of a gateway: the others are alike.
+  void refuse_other_kind(const XmlNode& entry, std::string_view attribute, Kind kind) {
+    const bool is_dds = kind == Kind::kDds;
+    const std::string other = name_of(is_dds ? Kind::kIceoryx : Kind::kDds);
+    Attributes(reader_, entry)
+        .error("other-kind", attribute,
+               std::string(attribute) + "=\"…\" belongs to an entry of a <gateway kind=\"" + other +
+                   "\">, and this one has kind=\"" + name_of(kind) +
+                   "\"; correct the kind, or name " +
+                   (is_dds ? "a topic of DDS: topic=\"…\" and type=\"…\""
+                           : "a topic of iceoryx: service=\"…\", instance=\"…\" and event=\"…\"") +
+                   ", in all its entries");
   }
 
   // In Cyclone capitals do not count.

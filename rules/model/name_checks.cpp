@@ -148,7 +148,9 @@ void warn_of_unread(const Model& model, const RuleSet& rules, NameCheck& names, 
                 : std::string("use it in a condition, correct its name, or remove this");
     diagnostics.warning("never-read", source.where,
                         "no rule reads or selects " + source.name +
-                            ", which is declared here: its activity decides nothing; " + advice);
+                            ", which is declared here: its activity decides nothing; " + advice,
+                        // Of a misspelt name nobody else can say that it is right.
+                        {.ports = {}, .source = written ? "" : source.name});
   }
 }
 

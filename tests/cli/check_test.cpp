@@ -239,6 +239,30 @@ TEST(Check, WhatAMappingFeedsIsPublished) {
   EXPECT_THAT(arbiter(beside).err, testing::Not(HasSubstr("never-published")));
 }
 
+// As docs/importing.md has a lock that is latched: the second source is declared for its T alone.
+TEST(Check, WhatAMappingFeedsIsDeclaredForItsT) {
+  TemporaryDirectory directory;
+  const std::string mapping =
+      directory.write("g.xml",
+                      "<gateway kind='dds'><in topic='/pause' type='std_msgs/msg/Bool' "
+                      "true='/pause/active:o' false='/pause/released:o' qos='latched'/></gateway>");
+  const auto err_of = [&](const std::string& released, const std::string& condition) {
+    const auto model = directory.write(
+        "m.xml", "<behaviors><source port='/pause/active:o' timeout='forever'/><source port='" +
+                     released +
+                     "' timeout='forever'/><arbiter at='/Base:i'><select from='/Nav:o'>" +
+                     condition + "</select></arbiter></behaviors>");
+    return arbiter({"check", model, "--gateway", mapping}).err;
+  };
+  EXPECT_EQ(err_of("/pause/released:o", "not /pause/active:o").find("never-read"),
+            std::string::npos);
+  EXPECT_THAT(err_of("/pause/relased:o", "not /pause/active:o"), HasSubstr("never-read"))
+      << "the mapping brings another one";
+  EXPECT_THAT(err_of("/pause/released:o", "not /pause/active:o and not /pause/relased:o"),
+              HasSubstr("never-read"))
+      << "it is meant where a name is misspelt";
+}
+
 // Whatever reading and checking may find, by the text of the program.
 TEST(Check, EachCodeOfAWarningOrANoteIsOnThePageAndCanBeSilenced) {
   TemporaryDirectory directory;

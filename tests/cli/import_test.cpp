@@ -36,6 +36,24 @@ TEST(Import, WritesAModelThatChecksWithoutWarnings) {
   EXPECT_EQ(printed.out, content_of(folder + "/model.xml"));
 }
 
+TEST(Import, TakesAHyphenForStandardOutput) {
+  TemporaryDirectory directory;
+  const auto yaml = directory.write("mux.yaml", kMux);
+  const std::string mapping = directory.path() + "/mapping.xml";
+  const auto plain = arbiter({"import", "twist_mux", yaml});
+  EXPECT_EQ(arbiter({"import", "twist_mux", yaml, "-o", "-"}).out, plain.out);
+  EXPECT_EQ(arbiter({"import", "twist_mux", yaml, "-o", "-", "--mapping", mapping}).out, plain.out);
+  EXPECT_THAT(content_of(mapping), HasSubstr("model.xml"));
+  const std::string model = directory.path() + "/model.xml";
+  EXPECT_EQ(arbiter({"import", "twist_mux", yaml, "-o", model, "--mapping", "-"}).out,
+            content_of(mapping));
+  EXPECT_FALSE(std::filesystem::exists("-"));
+  const auto both = arbiter({"import", "twist_mux", yaml, "--mapping", "-"});
+  EXPECT_EQ(both.exit_code, 2);
+  EXPECT_THAT(both.err, HasSubstr("give one of them a file"));
+  EXPECT_EQ(arbiter({"import", "twist_mux", yaml, "-o", "-", "--mapping", "-"}).exit_code, 2);
+}
+
 TEST(Import, SuggestsTheKindThatWasMeant) {
   const auto result = arbiter({"import", "twistmux", "mux.yaml"});
   EXPECT_EQ(result.exit_code, 2);

@@ -169,6 +169,20 @@ TEST(CheckMapping, APortThatTheModelDoesNotMentionIsFound) {
   EXPECT_EQ(read.diagnostics.items()[0].code, "unmentioned-port");
   EXPECT_THAT(read.message(0), HasSubstr("did you mean \"/Nav/cmd:o\"?"));
   EXPECT_THAT(read.message(1), HasSubstr("did you mean \"/Base/cmd:i\"?"));
+  EXPECT_THAT(read.message(1), HasSubstr("so that nothing but the idle sample comes of it; did"));
+  const std::string silent = "<out topic='/x' type='a/msg/B' port='/x:i' idle='none'/>";
+  EXPECT_THAT(check(dds(silent)).message(1), HasSubstr("so that nothing comes of it; "));
+}
+
+// What was refused is not in an entry, and would seem to be wrong for another reason.
+TEST(CheckMapping, AnEntryWithErrorsIsNotLookedAtAnyMore) {
+  const std::string topic = "service='a' instance='b' event='' ";
+  Read read = read_iceoryx("<in " + topic + "port='/Nav/cmd:o'/><out " + topic +
+                           "port='/Base/cmd:i' idle='zero'/>");
+  const std::vector<std::string> before = read.findings();
+  EXPECT_THAT(before, testing::Not(IsEmpty()));
+  check_mappings({read.mapping}, nullptr, read.diagnostics);
+  EXPECT_EQ(read.findings(), before);
 }
 
 TEST(CheckMapping, AnEntryIsAtTheRightEnd) {

@@ -41,6 +41,11 @@ TEST(Mapping, AFieldIsOneThatASampleHas) {
   EXPECT_THAT(
       read("std_msgs/msg/Float32", "threshold='1' field='u32'").message(),
       HasSubstr("the fields of a std_msgs/msg/Float32 are f32, not u32; write field=\"f32\""));
+  EXPECT_THAT(read("std_msgs/msg/Empty", "threshold='1' field='u8'").message(),
+              HasSubstr("a std_msgs/msg/Empty says nothing, so that nothing in it can choose "));
+  EXPECT_THAT(
+      read_dds("<in topic='/a' type='std_msgs/msg/Empty' true='/a:o' false='/b:o'/>").message(),
+      HasSubstr("write port=\"…\" in place of the two, or map a topic of another type"));
   EXPECT_THAT(read("std_msgs/msg/Bool", "threshold='1' field='u8'").message(),
               HasSubstr("are Boolean, not u8; write true=\"…\" and false=\"…\""));
   EXPECT_THAT(read_dds("<in topic='/a' type='geometry_msgs/msg/Twist' true='/a:o' false='/b:o'/>")

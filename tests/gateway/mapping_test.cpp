@@ -12,6 +12,21 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
 
+// Under another kind each attribute would be an error, and each that it lacks.
+TEST(Mapping, EntriesOfTheOtherKindAreToldOfOnce) {
+  const std::string topic = "<in topic='/a' type='a/msg/B' port='/a:o'/>";
+  const std::string service = "<in service='a' instance='b' event='c' port='/a:o'/>";
+  const Read dds = read_iceoryx(topic + topic);
+  EXPECT_THAT(dds.findings(), ElementsAre("1:36 error other-kind"));
+  EXPECT_THAT(dds.message(),
+              HasSubstr("topic=\"…\" belongs to an entry of a <gateway kind=\"dds\">, and this one "
+                        "has kind=\"iceoryx\"; correct the kind, or name a topic of iceoryx: "
+                        "service=\"…\""));
+  const Read iceoryx = read_dds(service + service);
+  EXPECT_THAT(iceoryx.findings(), ElementsAre("1:34 error other-kind"));
+  EXPECT_THAT(iceoryx.message(), HasSubstr("correct the kind, or name a topic of DDS: topic="));
+}
+
 TEST(Mapping, ReadsRos2NamesAsDdsHasThem) {
   const Read read = read_text(
       "<gateway kind='dds' domain='7' interface='lo, eth0' peers='10.0.0.2'>\n"

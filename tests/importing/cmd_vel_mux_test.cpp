@@ -85,6 +85,9 @@ TEST(CmdVelMux, WhatItRefusesIsRefused) {
               ElementsAre("2:39 error invalid-priority"));
   EXPECT_THAT(findings(kobuki("a: {topic: a, timeout: 0.1, priority: 4294967296, short_desc: x}")),
               ElementsAre("2:39 error invalid-priority"));
+  EXPECT_THAT(findings(kobuki("a: {topic: 9, timeout: 0.0, priority: -1, short_desc: x}")),
+              ElementsAre("2:12 error invalid-topic", "2:24 error invalid-timeout",
+                          "2:39 error invalid-priority"));
   EXPECT_THAT(findings(kobuki("a: {topic: a, timeout: 0.1, priority: 1}")),
               ElementsAre("2:1 warning no-description"));
   EXPECT_THAT(findings(kobuki("a: {topic: a, timeout: 0.1, priority: 1, short_desc: x},\n"

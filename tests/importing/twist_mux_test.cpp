@@ -174,6 +174,9 @@ TEST(TwistMux, WhatCannotBeImportedIsAnError) {
               ElementsAre("2:47 error invalid-priority"));
   EXPECT_THAT(findings(topics({"name: a, topic: 9 a, timeout: 0.5, priority: 5"})),
               ElementsAre("2:20 error invalid-topic"));
+  EXPECT_THAT(findings(topics({"name: a, topic: /a//b, timeout: 1e-1, priority: 99999999999"})),
+              ElementsAre("2:20 error invalid-topic", "2:36 error invalid-timeout",
+                          "2:52 error invalid-priority"));
   EXPECT_THAT(findings(topics({"name: a, topic: /joy_vel, timeout: 0.5, priority: 5", kJoystick})),
               ElementsAre("2:20 error same-topic"));
   EXPECT_THAT(
