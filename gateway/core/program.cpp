@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <exception>
 #include <iostream>
+#include <sstream>
 #include <stdexcept>
 #include <utility>
 
@@ -57,6 +58,17 @@ constexpr unsigned kEndsWithin = 2;  // s
 // A supervisor looks once a second, and gives its worker five (Patience::silence).
 constexpr shm::Nanoseconds kBeatPeriod = 400'000'000;
 
+// Whoever only checks wants all of it, however long that takes. A gateway goes on.
+void tell(const rules::Diagnostics& diagnostics, bool only_checks) {
+  if (only_checks) {
+    rules::write_text(std::cerr, diagnostics);
+    return;
+  }
+  std::ostringstream text;
+  rules::write_text(text, diagnostics);
+  say_lines(text.str());
+}
+
 // Nothing: there are errors, which have been said.
 std::optional<std::vector<Mapping>> read(const Arguments& arguments, const ProgramKind& kind,
                                          const ReadFile& read_file) {
@@ -76,7 +88,7 @@ std::optional<std::vector<Mapping>> read(const Arguments& arguments, const Progr
                           name_of(kind.kind) + "\">; write some, or start another gateway");
   }
   if (!arguments.check) diagnostics.drop_notes();
-  rules::write_text(std::cerr, diagnostics);
+  tell(diagnostics, arguments.check);
   if (diagnostics.has_errors()) return {};
   if (arguments.check) std::cout << "ok: " << entries << (entries == 1 ? " entry\n" : " entries\n");
   return mappings;

@@ -1,45 +1,74 @@
 #include "gateway/core/say.hpp"
 
-#include <sys/stat.h>
 #include <unistd.h>
 
-#include <cstdio>
+#include <atomic>
+#include <chrono>
 #include <cstdlib>
 #include <string>
+#include <utility>
 
+#include "logging/journal.hpp"
+#include "logging/log_writer.hpp"
 #include "shm/utf8.hpp"
 
 namespace arbiter::gateway {
 namespace {
+
+// For a reader that reads. Within it the writer's thread has long had its turn.
+constexpr std::chrono::milliseconds kPatience{10};
+constexpr std::chrono::milliseconds kPatienceAtEnd{1000};
 
 std::string& program_name() {
   static std::string name = "arbiter-gateway";
   return name;
 }
 
-// systemd names the device and inode of the stream that it has made for us.
-bool leads_to_journal() {
-  const char* const stream = std::getenv("JOURNAL_STREAM");
-  struct stat is {};
-  if (stream == nullptr || ::fstat(STDERR_FILENO, &is) != 0) return false;
-  return std::to_string(is.st_dev) + ":" + std::to_string(is.st_ino) == stream;
+// systemd reads the level there.
+std::string begin_of(Level level) {
+  static const bool is_journal = logging::is_journal(STDERR_FILENO, std::getenv("JOURNAL_STREAM"));
+  if (!is_journal) return program_name() + ": ";
+  const char priority = level == Level::kError     ? logging::kErrorPriority
+                        : level == Level::kWarning ? logging::kWarningPriority
+                                                   : logging::kInfoPriority;
+  return std::string("<") + priority + ">";
 }
 
-const char* priority_of(Level level) {
-  if (level == Level::kError) return "<3>";
-  return level == Level::kWarning ? "<4>" : "<6>";
+class StandardError {
+ public:
+  StandardError() : writer_(logging::LogWriter::to_standard_error(begin_of(Level::kWarning))) {}
+
+  // Whoever ends the process next, by a signal or by _Exit(), has its last words in the log. Where
+  // nobody reads it, only the first line waits, until the reader has caught up.
+  void write(std::string line) {
+    writer_.put(std::move(line));
+    is_unread_ = !writer_.wait(is_unread_ ? std::chrono::milliseconds(0) : kPatience);
+  }
+  void end() { writer_.wait(kPatienceAtEnd); }
+
+ private:
+  logging::LogWriter writer_;
+  std::atomic<bool> is_unread_ = false;
+};
+
+// Never destroyed: threads may say something until the process ends.
+StandardError& standard_error() {
+  static StandardError& made = *new StandardError;
+  static const int at_exit = std::atexit([] { standard_error().end(); });
+  static_cast<void>(at_exit);
+  return made;
 }
 
 }  // namespace
 
 void set_program_name(std::string_view name) { program_name() = name; }
 
-// In one write, so that lines of several threads and processes stay whole.
+void say_lines(std::string lines) {
+  if (!lines.empty()) standard_error().write(std::move(lines));
+}
+
 void say(Level level, std::string_view text) {
-  static const bool is_journal = leads_to_journal();
-  const std::string begin = is_journal ? priority_of(level) : program_name() + ": ";
-  const std::string line = begin + shm::printable(text) + "\n";
-  static_cast<void>(!::write(STDERR_FILENO, line.data(), line.size()));
+  standard_error().write(begin_of(level) + shm::printable(text) + "\n");
 }
 
 }  // namespace arbiter::gateway

@@ -1,6 +1,7 @@
 // Lines on standard error, for people or for the journal.
 #pragma once
 
+#include <string>
 #include <string_view>
 
 namespace arbiter::gateway {
@@ -10,7 +11,14 @@ enum class Level { kError, kWarning, kInfo };
 // What lines begin with on a terminal: the program's name. Before threads start.
 void set_program_name(std::string_view name);
 
-// One line; the journal is told its level. Control characters are escaped. Any thread.
+// One line; the journal is told its level. Control characters are escaped. Any thread, but not in a
+// child between fork() and exec().
+//
+// Whether or not somebody reads it: a line waits 10 ms for the reader; once one has waited in vain,
+// no other does, until the reader has caught up (logging/log_writer.hpp). When the process exits,
+// what waits then has another second.
 void say(Level level, std::string_view text);
+// Whole lines, as they are: findings with what they are about.
+void say_lines(std::string lines);
 
 }  // namespace arbiter::gateway

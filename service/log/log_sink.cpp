@@ -2,6 +2,7 @@
 
 #include <utility>
 
+#include "service/log/journal.hpp"
 #include "shm/utf8.hpp"
 
 namespace arbiter::service {

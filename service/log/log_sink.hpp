@@ -18,10 +18,12 @@
 #include <optional>
 #include <string>
 
+#include "logging/log_writer.hpp"
 #include "service/log/event.hpp"
-#include "service/log/log_writer.hpp"
 
 namespace arbiter::service {
+
+using logging::LogWriter;
 
 // While it lives, what this thread logs is charged to a user. They nest; the inner one counts.
 class LogAccount {

@@ -13,8 +13,8 @@
 
 #include <arbiter/arbiter.hpp>
 
+#include "logging/log_writer.hpp"
 #include "service/log/log_sink.hpp"
-#include "service/log/log_writer.hpp"
 #include "tests/client/component.hpp"
 #include "tests/client/models.hpp"
 #include "tests/client/samples.hpp"

@@ -10,8 +10,8 @@
 #include <sstream>
 #include <thread>
 
+#include "logging/log_writer.hpp"
 #include "service/log/log_sink.hpp"
-#include "service/log/log_writer.hpp"
 #include "tests/support/daemon.hpp"
 #include "tests/support/raw_client.hpp"
 

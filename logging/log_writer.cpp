@@ -1,4 +1,4 @@
-#include "service/log/log_writer.hpp"
+#include "logging/log_writer.hpp"
 
 #include <fcntl.h>
 #include <poll.h>
@@ -16,7 +16,7 @@
 
 #include "shm/file_descriptor.hpp"
 
-namespace arbiter::service {
+namespace arbiter::logging {
 
 namespace {
 
@@ -25,19 +25,20 @@ bool is_regular_file(int fd) {
   return fstat(fd, &status) == 0 && S_ISREG(status.st_mode);
 }
 
-// What cannot be written at all (the reader has closed its end) is given up.
+// What cannot be written at all (the reader has closed its end, or nothing is taken) is given up.
 void write_all(int fd, const std::string& text) {
   std::size_t done = 0;
   while (done < text.size()) {
     const ssize_t written = ::write(fd, text.data() + done, text.size() - done);
     if (written > 0) {
       done += static_cast<std::size_t>(written);
-    } else if (errno == EAGAIN) {  // somebody has made it non-blocking for all
-      pollfd writable{fd, POLLOUT, 0};
-      ::poll(&writable, 1, -1);
-    } else if (errno != EINTR) {
-      return;
+      continue;
     }
+    // That nothing was written is no error, and sets no errno.
+    if (written == 0 || (errno != EINTR && errno != EAGAIN)) return;
+    if (errno == EINTR) continue;
+    pollfd writable{fd, POLLOUT, 0};  // somebody has made it non-blocking for all
+    ::poll(&writable, 1, -1);
   }
 }
 
@@ -51,13 +52,16 @@ struct LogWriter::Shared {
     [[nodiscard]] std::size_t bytes() const { return sizeof(Line) + text.size() + record.size(); }
   };
 
-  shm::FileDescriptor fd;
+  int fd = -1;
+  shm::FileDescriptor own;  // empty: fd is somebody else's
   std::optional<JournalSocket> journal;
+  std::string begin = "[log] ";  // of the line that counts what was lost
   std::mutex mutex;
   std::condition_variable changed;
   std::vector<Line> waiting;
   std::size_t bytes_waiting = 0;
   std::uint64_t lost = 0;  // lines that did not fit, since the last that did
+  bool is_writing = false;
   bool is_ending = false;
   bool has_ended = false;  // all is written
 
@@ -66,7 +70,9 @@ struct LogWriter::Shared {
     waiting.push_back(std::move(line));
   }
   void add_loss();
+  [[nodiscard]] bool is_done() const { return waiting.empty() && lost == 0 && !is_writing; }
   void write(const std::vector<Line>& lines) const;
+  void run();
 };
 
 // The text in as few calls as there can be.
@@ -75,75 +81,108 @@ void LogWriter::Shared::write(const std::vector<Line>& lines) const {
   for (const Line& line : lines) {
     if (!journal || !journal->send(line.record)) text += line.text;
   }
-  write_all(fd.get(), text);
+  write_all(fd, text);
 }
 
 void LogWriter::Shared::add_loss() {
   const std::uint64_t lines = std::exchange(lost, 0);
   if (lines == 0) return;
   const std::string text = std::to_string(lines) + " lines were lost here: nobody read the log";
-  add({"[log] " + text + "\n", journal_record(text, log::level::warn, nullptr, {})});
+  add({begin + text + "\n", journal ? journal_record(text, kWarningPriority) : std::string()});
 }
+
+void LogWriter::Shared::run() {
+  std::unique_lock lock(mutex);
+  for (;;) {
+    changed.wait(lock, [&] { return !waiting.empty() || lost != 0 || is_ending; });
+    add_loss();
+    if (waiting.empty()) break;
+    const std::vector<Line> lines = std::exchange(waiting, {});
+    bytes_waiting = 0;
+    is_writing = true;
+    lock.unlock();
+    write(lines);
+    lock.lock();
+    is_writing = false;
+    changed.notify_all();
+  }
+  has_ended = true;
+  changed.notify_all();
+}
+
+LogWriter::LogWriter(std::shared_ptr<Shared> shared, bool needs_reader)
+    : has_journal_(shared->journal.has_value()),
+      needs_reader_(needs_reader),
+      shared_(std::move(shared)) {}
 
 LogWriter::LogWriter(int fd, std::optional<JournalSocket> journal)
     : has_journal_(journal.has_value()),
       needs_reader_(has_journal_ || !is_regular_file(fd)),
       shared_(std::make_shared<Shared>()) {
   shared_->journal = std::move(journal);
-  shared_->fd.reset(fcntl(fd, F_DUPFD_CLOEXEC, 0));
-  if (!shared_->fd)
+  shared_->own.reset(fcntl(fd, F_DUPFD_CLOEXEC, 0));
+  if (!shared_->own)
     throw std::system_error(errno, std::generic_category(), "no log can be written");
-  if (!needs_reader_) return;
-  thread_ = std::thread([shared = shared_] {
-    // Where the reader has gone, write() is to fail, not to end the process.
-    sigset_t pipe;
-    sigemptyset(&pipe);
-    sigaddset(&pipe, SIGPIPE);
-    pthread_sigmask(SIG_BLOCK, &pipe, nullptr);
-    std::unique_lock lock(shared->mutex);
-    for (;;) {
-      shared->changed.wait(lock, [&] { return !shared->waiting.empty() || shared->is_ending; });
-      if (shared->waiting.empty()) break;
-      const std::vector<Shared::Line> lines = std::exchange(shared->waiting, {});
-      shared->bytes_waiting = 0;
-      lock.unlock();
-      shared->write(lines);
-      lock.lock();
-    }
-    shared->has_ended = true;
-    shared->changed.notify_all();
-  });
+  shared_->fd = shared_->own.get();
+}
+
+LogWriter LogWriter::to_standard_error(std::string begin) {
+  auto shared = std::make_shared<Shared>();
+  shared->fd = STDERR_FILENO;
+  shared->begin = std::move(begin);
+  return {std::move(shared), !is_regular_file(STDERR_FILENO)};
 }
 
 LogWriter::~LogWriter() { finish(std::chrono::seconds(1)); }
+
+// Under the mutex. The thread inherits what is blocked: all, so that signals reach those who wait
+// for them, and write() fails, and does not end the process, where the reader has gone.
+void LogWriter::start() {
+  if (thread_.joinable()) return;
+  sigset_t all;
+  sigset_t before;
+  sigfillset(&all);
+  pthread_sigmask(SIG_SETMASK, &all, &before);
+  try {
+    thread_ = std::thread([shared = shared_] { shared->run(); });
+  } catch (const std::system_error&) {  // too many threads: the next line tries again
+  }
+  pthread_sigmask(SIG_SETMASK, &before, nullptr);
+}
 
 void LogWriter::put(std::string line, std::string record) {
   const std::lock_guard lock(shared_->mutex);
   if (shared_->is_ending) return;
   if (!needs_reader_) {
-    write_all(shared_->fd.get(), line);
+    write_all(shared_->fd, line);
     return;
   }
+  start();
   Shared::Line added{std::move(line), std::move(record)};
   if (shared_->bytes_waiting + added.bytes() > kMaxWaiting) {
     ++shared_->lost;
-    return;
+  } else {
+    shared_->add_loss();
+    shared_->add(std::move(added));
   }
-  shared_->add_loss();
-  shared_->add(std::move(added));
   shared_->changed.notify_all();
 }
 
-bool LogWriter::finish(std::chrono::milliseconds limit) {
-  if (!thread_.joinable()) return !needs_reader_;
+bool LogWriter::wait(std::chrono::milliseconds limit) {
   std::unique_lock lock(shared_->mutex);
-  shared_->add_loss();
+  return shared_->changed.wait_for(lock, limit, [&] { return shared_->is_done(); });
+}
+
+bool LogWriter::finish(std::chrono::milliseconds limit) {
+  std::unique_lock lock(shared_->mutex);
+  if (!shared_->is_done()) start();
   shared_->is_ending = true;
   shared_->changed.notify_all();
+  if (!thread_.joinable()) return shared_->is_done();
   const bool is_done = shared_->changed.wait_for(lock, limit, [&] { return shared_->has_ended; });
   lock.unlock();
   is_done ? thread_.join() : thread_.detach();
   return is_done;
 }
 
-}  // namespace arbiter::service
+}  // namespace arbiter::logging
