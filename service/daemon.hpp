@@ -106,6 +106,7 @@ class Daemon final : private Takeover::Host {
   void accept_clients();
   void admit_clients();
   void turn_away_client();
+  void leave_listener_alone();
   void drop(ClientId id) override;
   void log_end_of(const Client& client, bool is_away);
   void drop_oldest_silent_client();
@@ -173,8 +174,9 @@ class Daemon final : private Takeover::Host {
   Refusals refusals_;
   wire::Listener listener_;
   shm::FileDescriptor epoll_;
-  // Not before: there was no descriptor even to turn a client away.
+  // Not before: there was no descriptor even to turn a client away, or no memory to accept one.
   shm::Nanoseconds listen_again_at_ = shm::kForever;
+  bool cannot_accept_ = false;  // the log has why
   Lobby lobby_;
   std::vector<Postponed> postponed_;
   bool try_postponed_ = false;  // something has changed that they wait for

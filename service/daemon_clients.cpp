@@ -22,7 +22,7 @@
 namespace arbiter::service {
 namespace {
 
-// Without a descriptor to accept a client with.
+// Without a descriptor, or memory, to accept a client with.
 constexpr shm::Nanoseconds kListenAgainAfter = 100'000'000;
 
 // How often it is looked who has read what he was sent, where somebody waits for that.
@@ -65,11 +65,16 @@ void Daemon::accept_clients() {
     if (!socket) {
       if (errno == EMFILE || errno == ENFILE) {
         turn_away_client();
-      } else if (errno != EAGAIN && errno != ECONNABORTED) {
-        log::warn("accept: {}", std::strerror(errno));
+      } else if (errno != EAGAIN && errno != ECONNABORTED && errno != EINTR) {
+        if (!std::exchange(cannot_accept_, true)) {
+          log::warn("no client can be accepted, which is tried again until one can: {}",
+                    std::strerror(errno));
+        }
+        leave_listener_alone();
       }
       return;
     }
+    cannot_accept_ = false;
     const uid_t user = user_of(socket);
     const LogAccount account(user);
     try {
@@ -171,6 +176,12 @@ void Daemon::plan_to_look_in_flight() {
   look_in_flight_at_ = std::min(look_in_flight_at_, shm::monotonic_now() + after);
 }
 
+// Who waits in its queue is heard then.
+void Daemon::leave_listener_alone() {
+  listen_again_at_ = shm::monotonic_now() + kListenAgainAfter;
+  watch(listener_.socket.get(), Tag::kListener, 0, 0);
+}
+
 // It would stay in the listener's queue, and the loop would never rest. Where there is not even a
 // descriptor for that, the listener is left alone for a while.
 void Daemon::turn_away_client() {
@@ -180,8 +191,7 @@ void Daemon::turn_away_client() {
     socket.reset(accept4(listener_.socket.get(), nullptr, nullptr, SOCK_CLOEXEC));
   }
   if (!socket) {
-    listen_again_at_ = shm::monotonic_now() + kListenAgainAfter;
-    watch(listener_.socket.get(), Tag::kListener, 0, 0);
+    leave_listener_alone();
     return;
   }
   const uid_t user = user_of(socket);

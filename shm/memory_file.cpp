@@ -11,8 +11,13 @@ namespace arbiter::shm {
 bool write_whole(int file, std::string_view content) noexcept {
   for (std::string_view rest = content; !rest.empty();) {
     const ssize_t written = ::write(file, rest.data(), rest.size());
-    if (written <= 0) return false;
-    rest.remove_prefix(static_cast<std::size_t>(written));
+    if (written > 0) {
+      rest.remove_prefix(static_cast<std::size_t>(written));
+      continue;
+    }
+    if (written < 0 && errno == EINTR) continue;
+    if (written == 0) errno = ENOSPC;  // nobody says why; there is no room, as far as one can tell
+    return false;
   }
   return true;
 }

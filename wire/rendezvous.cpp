@@ -286,7 +286,12 @@ Listener listen_as(const std::string& directory, const std::string& instance,
   const std::string lock_path = directory + "/" + instance + lock_ending;
   listener.lock.reset(open(lock_path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0600));
   if (!listener.lock) fail("cannot open " + lock_path);
-  if (flock(listener.lock.get(), LOCK_EX | LOCK_NB) != 0) {
+  int locked = 0;
+  do {
+    locked = flock(listener.lock.get(), LOCK_EX | LOCK_NB);
+  } while (locked != 0 && errno == EINTR);
+  if (locked != 0) {
+    if (errno != EWOULDBLOCK) fail("cannot lock " + lock_path);
     throw std::runtime_error(std::string(who) + " of instance \"" + instance +
                              "\" is running already (" + listener.path +
                              "); choose another name with --instance");

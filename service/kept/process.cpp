@@ -1,7 +1,9 @@
 #include "service/kept/process.hpp"
 
 #include <poll.h>
+#include <signal.h>
 
+#include <cerrno>
 #include <fstream>
 #include <iterator>
 #include <sstream>
@@ -31,16 +33,26 @@ ProcessStatus status_of(pid_t pid) {
   return status;
 }
 
+// What has ended stays until its parent asks how; so does a first thread that ended before others.
+bool has_ended(const ProcessStatus& status) {
+  return (status.state == 'Z' || status.state == 'X') && status.threads <= 1;
+}
+
 }  // namespace
 
 std::uint64_t start_of_process(pid_t pid) { return status_of(pid).started; }
 
-// What has ended stays until its parent asks how; so does a first thread that ended before others.
 bool Process::lives() const {
   if (pid <= 0 || started == 0) return false;
   const ProcessStatus status = status_of(pid);
-  const bool has_ended = status.state == 'Z' || status.state == 'X';
-  return status.started == started && (!has_ended || status.threads > 1);
+  return status.started == started && !has_ended(status);
+}
+
+bool Process::has_surely_ended() const {
+  if (pid <= 0 || started == 0) return true;
+  const ProcessStatus status = status_of(pid);
+  if (status.started == 0) return ::kill(pid, 0) != 0 && errno == ESRCH;  // it cannot be read
+  return status.started != started || has_ended(status);
 }
 
 bool has_ended(const shm::FileDescriptor& process) {

@@ -14,6 +14,8 @@ struct Process {
   std::uint64_t started = 0;
 
   [[nodiscard]] bool lives() const;
+  // Not the contrary: false, too, where that cannot be told, as for want of a descriptor.
+  [[nodiscard]] bool has_surely_ended() const;
   friend bool operator==(const Process&, const Process&) = default;
 };
 // When a process began, in clock ticks since boot; 0 where that cannot be told.

@@ -30,17 +30,23 @@ class StateFile {
  public:
   StateFile(const std::string& directory, const std::string& instance);
   // Nothing, too, where it is not such a file.
-  [[nodiscard]] std::optional<Predecessor> read() const;
-  // Replaces it at once. Throws std::system_error.
+  [[nodiscard]] std::optional<Predecessor> read();
+  // Replaces it at once. Throws std::system_error: then it is what it was if it names that realm,
+  // else it is gone, for a successor would look for what nobody has.
   void write(const Realm& realm, const std::vector<Process>& components);
-  // One more component. Whoever it cannot be told of may have to start anew after a restart.
-  void add(const Process& component) noexcept;
+  // Whether there is one, with the realm that was read or written last.
+  [[nodiscard]] bool is_there() const { return named_.has_value(); }
+  // One more component, where there is one. Throws std::system_error.
+  void add(const Process& component);
   // How many components it names, some of which may have ended.
   [[nodiscard]] std::size_t size() const noexcept { return size_; }
-  void remove() const noexcept;
+  void remove() noexcept;
 
  private:
+  void replace(const Realm& realm, const std::vector<Process>& components);
+
   std::string path_;
+  std::optional<Realm> named_;  // the realm that it names
   std::size_t size_ = 0;
 };
 

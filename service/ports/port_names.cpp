@@ -3,7 +3,10 @@
 #include <fcntl.h>
 
 #include <algorithm>
+#include <charconv>
+#include <optional>
 #include <stdexcept>
+#include <string_view>
 #include <utility>
 
 #include "service/kept/descriptor_store.hpp"
@@ -16,8 +19,19 @@
 namespace arbiter::service {
 namespace {
 
+constexpr std::string_view kStoredPage = "page-";
+
 std::string stored_name(shm::SourceId id, shm::PageNumber number) {
-  return "page-" + std::to_string(id) + "-" + std::to_string(number);
+  return std::string(kStoredPage) + std::to_string(id) + "-" + std::to_string(number);
+}
+
+// Whose page has that name.
+std::optional<shm::SourceId> source_of_stored(const std::string& name) {
+  if (!name.starts_with(kStoredPage)) return {};
+  shm::SourceId id = 0;
+  const auto read =
+      std::from_chars(name.data() + kStoredPage.size(), name.data() + name.size(), id);
+  return read.ec == std::errc() ? std::optional(id) : std::nullopt;
 }
 
 [[noreturn]] void refuse(const char* what, std::uint32_t limit) {
@@ -105,9 +119,9 @@ bool PortNames::take_page(shm::SourceId id, const shm::FileDescriptor& page) {
   return true;
 }
 
-bool PortNames::take_page(const shm::FileDescriptor& page) {
-  return std::any_of(sources_.begin(), sources_.end(),
-                     [&](const auto& source) { return take_page(source->id, page); });
+bool PortNames::take_stored_page(const std::string& name, const shm::FileDescriptor& page) {
+  const auto id = source_of_stored(name);
+  return id && take_page(*id, page);
 }
 
 bool PortNames::has_lost_page(const Source& source) {

@@ -87,7 +87,8 @@ class PortNames {
   // One page that somebody hands back. False: it is not the page in force of that source.
   // Throws std::runtime_error where it is none that a daemon of ours has made.
   bool take_page(shm::SourceId id, const shm::FileDescriptor& page);
-  bool take_page(const shm::FileDescriptor& page);  // of whichever source
+  // The same of one that the service manager has kept, under the name that it was given.
+  bool take_stored_page(const std::string& name, const shm::FileDescriptor& page);
   // Of a source whose page nobody has, and whose publisher is gone: another page takes the place of
   // the lost one, under the next number, which no old page has. Nobody's activity is on it. Throws
   // std::system_error.

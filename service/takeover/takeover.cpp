@@ -9,6 +9,7 @@
 #include <system_error>
 #include <utility>
 
+#include "service/clients/headroom.hpp"
 #include "service/kept/descriptor_store.hpp"
 #include "service/kept/step.hpp"
 #include "service/log/event.hpp"
@@ -25,6 +26,9 @@ constexpr shm::Nanoseconds kMaxWaitForReturn = 500'000'000;
 constexpr shm::Nanoseconds kMaxWaitForRealm = 2'000'000'000;
 // How many components that have ended the state file may name.
 constexpr std::size_t kMaxForgotten = 64;
+// For want of room or of descriptors: when it is tried again to write the state file, or to watch
+// an absentee.
+constexpr shm::Nanoseconds kTryAgainAfter = 1'000'000'000;
 
 shm::FileDescriptor open_process(pid_t pid) {
   return shm::FileDescriptor(static_cast<int>(syscall(SYS_pidfd_open, pid, 0)));
@@ -52,7 +56,7 @@ Takeover::Takeover(const Parts& parts, Host& host, StateFile state, bool stores)
       state_(std::move(state)),
       stores_(stores) {}
 
-bool Takeover::may_inherit() const {
+bool Takeover::may_inherit() {
   const auto state = state_.read();
   return (state && state->is_survived) || (stores_ && has_stored());
 }
@@ -82,7 +86,7 @@ bool Takeover::inherit_stored() {
     inherit(board->descriptor, registry->descriptor);
     for (const StoredDescriptor& each : stored) {
       if (&each == &*board || &each == &*registry) continue;
-      if (!names_.take_page(each.descriptor)) discard_stored(each.name);
+      if (!names_.take_stored_page(each.name, each.descriptor)) discard_stored(each.name);
     }
     return true;
   } catch (const std::exception& error) {
@@ -116,12 +120,13 @@ void Takeover::find_absentees() {
 }
 
 void Takeover::add_absentee(const Owner& owner) {
-  Absentee& absentee = absentees_[owner.node];
-  if (!absentee.process) {
+  const auto [found, is_new] = absentees_.try_emplace(owner.node);
+  Absentee& absentee = found->second;
+  if (is_new) {
     absentee.pid = owner.process.pid;
+    absentee.started = owner.process.started;
     absentee.user = user_of_process(owner.process.pid);
-    absentee.process = open_process(owner.process.pid);
-    if (!absentee.process || !owner.process.lives() || has_ended(absentee.process)) {
+    if (!open_and_watch(owner.node, absentee)) {
       absentees_.erase(owner.node);
       switchboard_.forget_away(owner.port);
       return;
@@ -130,9 +135,36 @@ void Takeover::add_absentee(const Owner& owner) {
     absentee.charge = absentee.user && shares_.allows(*absentee.user, Share::kClients, 1)
                           ? shares_.take(*absentee.user, Share::kClients)
                           : shares_.take_own(Share::kClients);
-    host_.watch_absentee(absentee.process, owner.node);
   }
   absentee.ports.insert(owner.port);
+}
+
+// For want of a descriptor it is tried again: what lives is not taken for what has ended.
+bool Takeover::open_and_watch(NodeId node, Absentee& absentee) {
+  absentee.process = open_process(absentee.pid);
+  {
+    const Headroom::Use use;  // to look at it
+    const bool is_gone = Process{absentee.pid, absentee.started}.has_surely_ended();
+    if (is_gone || has_ended(absentee.process)) return false;
+  }
+  try {
+    if (absentee.process) host_.watch_absentee(absentee.process, node);
+  } catch (const std::system_error&) {
+    absentee.process.reset();
+  }
+  if (!absentee.process) {
+    watch_again_at_ = std::min(watch_again_at_, shm::monotonic_now() + kTryAgainAfter);
+  }
+  return true;
+}
+
+void Takeover::watch_unwatched() {
+  std::vector<NodeId> ended;
+  for (auto& [node, absentee] : absentees_) {
+    if (!absentee.process && absentee.started != 0 && !open_and_watch(node, absentee))
+      ended.push_back(node);
+  }
+  for (const NodeId node : ended) forget_absentee(node);
 }
 
 // All who came in time are back, or never will be.
@@ -174,23 +206,32 @@ void Takeover::replace_lost_pages() {
 }
 
 shm::Nanoseconds Takeover::deadline() const {
+  return std::min({deadline_of_return(), write_again_at_, watch_again_at_});
+}
+
+shm::Nanoseconds Takeover::deadline_of_return() const {
   if (phase_ == Phase::kTakingOver) return started_ + kMaxWaitForReturn;
   if (phase_ == Phase::kExpecting && !waiting_.empty()) return started_ + kMaxWaitForRealm;
   return shm::kForever;
 }
 
 void Takeover::advance(shm::Nanoseconds now) {
+  if (now >= watch_again_at_) {
+    watch_again_at_ = shm::kForever;
+    watch_unwatched();
+  }
+  if (now >= write_again_at_) remember_components();
   if (phase_ == Phase::kServing) return;
   const bool all_are_back = phase_ == Phase::kTakingOver && absentees_.empty() &&
                             std::none_of(clients_.begin(), clients_.end(), [](const auto& each) {
                               return each.second->is_returning;
                             });
-  if (all_are_back || now >= deadline()) finish();
+  if (all_are_back || now >= deadline_of_return()) finish();
 }
 
 // Components that live on need the state file to come back by, as what the service manager keeps
 // does.
-void Takeover::leave_nothing_if_nobody_is_left() const {
+void Takeover::leave_nothing_if_nobody_is_left() {
   if (!stores_ && is_over() && clients_.empty() && absentees_.empty()) state_.remove();
 }
 
@@ -200,25 +241,51 @@ void Takeover::welcome_waiting() {
   }
 }
 
-// For the next daemon.
-void Takeover::remember_components() {
-  std::vector<Process> components;
-  for (const auto& [id, client] : clients_) {
-    if (client->is_component) components.push_back(client->identity());
+// For the next daemon. That it cannot be written keeps nobody from being served by this one.
+void Takeover::remember_components() noexcept {
+  const Headroom::Use use;
+  try {
+    std::vector<Process> components;
+    for (const auto& [id, client] : clients_) {
+      if (client->is_component) components.push_back(client->identity());
+    }
+    for (const auto& [node, absentee] : absentees_) {
+      const auto started =
+          absentee.started != 0 ? absentee.started : start_of_process(absentee.pid);
+      components.push_back({absentee.pid, started});
+    }
+    state_.write({FileIdentity::of(board_.readable()), FileIdentity::of(registry_.readable())},
+                 components);
+    if (std::exchange(write_again_at_, shm::kForever) == shm::kForever) return;
+    log::info("what the next daemon needs to take over is written down again");
+  } catch (const std::exception& error) {
+    log_unwritten(error.what());
   }
-  for (const auto& [node, absentee] : absentees_) {
-    components.push_back({absentee.pid, start_of_process(absentee.pid)});
-  }
-  state_.write({FileIdentity::of(board_.readable()), FileIdentity::of(registry_.readable())},
-               components);
+}
+
+// Once until it is written.
+void Takeover::log_unwritten(const std::string& why) {
+  const bool is_news = write_again_at_ == shm::kForever;
+  write_again_at_ = shm::monotonic_now() + kTryAgainAfter;
+  if (!is_news) return;
+  log::warn(
+      "{}; should this daemon end before that can be written, {} must be restarted; it is "
+      "tried again every second",
+      why, state_.is_there() ? "components that have come since" : "all components");
 }
 
 void Takeover::remember_component(Client& client) {
   if (std::exchange(client.is_component, true)) return;
-  state_.add(client.identity());
-  if (state_.size() > kMaxForgotten + 2 * (clients_.size() + absentees_.size())) {
-    remember_components();
+  if (!state_.is_there()) return;  // it is to be written yet, with all components
+  const Headroom::Use use;
+  try {
+    state_.add(client.identity());
+  } catch (const std::system_error& error) {
+    log_unwritten(error.what());
+    return;
   }
+  const bool is_long = state_.size() > kMaxForgotten + 2 * (clients_.size() + absentees_.size());
+  if (is_long && write_again_at_ == shm::kForever) remember_components();
 }
 
 }  // namespace arbiter::service

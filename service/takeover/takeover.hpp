@@ -69,7 +69,7 @@ class Takeover {
   Takeover(const Parts& parts, Host& host, StateFile state, bool stores);
 
   // Before the beginning: whether a predecessor seems to have left anything.
-  [[nodiscard]] bool may_inherit() const;
+  [[nodiscard]] bool may_inherit();
   // The beginning: what is there of a predecessor. Without one it is over at once.
   void look_for_predecessor();
   // Only then is our own model put in force, and are others served.
@@ -77,7 +77,7 @@ class Takeover {
   [[nodiscard]] shm::Nanoseconds deadline() const;
   void advance(shm::Nanoseconds now);
   // The end, where nobody will come back to a successor: then none must look for them.
-  void leave_nothing_if_nobody_is_left() const;
+  void leave_nothing_if_nobody_is_left();
 
   // A client that has said hello waits until it is over.
   void let_wait(const Client& client) { waiting_.push_back(client.id()); }
@@ -127,8 +127,9 @@ class Takeover {
   struct Absentee {
     std::string name;  // of its node; empty where an earlier daemon knew it
     pid_t pid = 0;
-    std::optional<uid_t> user;  // empty: it cannot be told
-    shm::FileDescriptor process;
+    std::uint64_t started = 0;    // Process::started; 0 where its pidfd came with the component
+    std::optional<uid_t> user;    // empty: it cannot be told
+    shm::FileDescriptor process;  // none: it is to be opened yet
     std::set<shm::PortInstance> ports;
     std::string why_not_returned;  // Client::why_not_returned
     Charge charge;
@@ -138,13 +139,18 @@ class Takeover {
   void inherit(const shm::FileDescriptor& board, const shm::FileDescriptor& registry);
   void find_absentees();
   void add_absentee(const Owner& owner);
+  // False: it has ended.
+  [[nodiscard]] bool open_and_watch(NodeId node, Absentee& absentee);
+  void watch_unwatched();
   void take_back(Client& client, const wire::Received& hello);
   void log_end_of(const Absentee& absentee);
   void end_conversation_of(const Client& client, NodeId node);
   [[nodiscard]] static bool is_that(const Client& client, const Absentee& absentee);
   void give_up(NodeId node);
+  [[nodiscard]] shm::Nanoseconds deadline_of_return() const;
   void finish();
-  void remember_components();
+  void remember_components() noexcept;
+  void log_unwritten(const std::string& why);
   void replace_lost_pages();
 
   const Gate& gate_;
@@ -164,6 +170,9 @@ class Takeover {
   Strangers strangers_;
   Deaths deaths_;
   std::vector<ClientId> waiting_;  // have said hello, and are not welcomed yet
+  // When that is tried again which has failed: to write the state file, to watch absentees.
+  shm::Nanoseconds write_again_at_ = shm::kForever;
+  shm::Nanoseconds watch_again_at_ = shm::kForever;
 };
 
 }  // namespace arbiter::service

@@ -4,8 +4,10 @@
 #include <gtest/gtest.h>
 #include <poll.h>
 #include <pwd.h>
+#include <sys/file.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
+#include <sys/syscall.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -15,6 +17,7 @@
 #include <map>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "tests/support/other_user.hpp"
@@ -23,6 +26,7 @@
 namespace {
 
 int asked_for_arbiter = 0;
+int next_lock_fails_with = 0;  // an error's number; 0: it does not
 
 }  // namespace
 
@@ -32,6 +36,15 @@ extern "C" int getpwnam_r(const char*, passwd*, char*, size_t, passwd** found) {
   ++asked_for_arbiter;
   *found = nullptr;
   return ENOENT;
+}
+
+// Likewise: a signal, or a file system that has no locks to give.
+extern "C" int flock(int file, int operation) {
+  if (next_lock_fails_with == 0) {
+    return static_cast<int>(syscall(SYS_flock, file, operation));
+  }
+  errno = std::exchange(next_lock_fails_with, 0);
+  return -1;
 }
 
 namespace arbiter::wire {
@@ -188,6 +201,17 @@ TEST_F(Rendezvous, OneListenerAtATimeAndTheNextOneWhenItIsGone) {
     EXPECT_TRUE(other.socket);
   }
   EXPECT_TRUE(listen_at(directory_, "one").socket) << "the socket file was left behind";
+}
+
+TEST_F(Rendezvous, ASignalIsNoDaemon) {
+  next_lock_fails_with = EINTR;
+  EXPECT_TRUE(listen_at(directory_, "one").socket);
+}
+
+TEST_F(Rendezvous, WithoutLocksTheMessageDoesNotBlameAnotherDaemon) {
+  next_lock_fails_with = ENOLCK;
+  EXPECT_EQ(refusal([&] { listen_at(directory_, "one"); }),
+            "cannot lock " + directory_ + "/one.lock: No locks available");
 }
 
 TEST_F(Rendezvous, AClientFindsTheDaemonOfItsInstanceAndNoOther) {
