@@ -45,14 +45,14 @@ class FewFindings {
 };
 
 void add_mismatches(const wire::Status& status, Findings& found) {
-  FewFindings few(found, "type-mismatch", "connections are refused, because the ports do not fit");
+  FewFindings few(found, "type-mismatch", "connections are refused, for what their ports are");
   for (const wire::InputStatus& port : status.inputs) {
     for (const wire::ConnectionStatus& each : port.connections) {
       if (!each.mismatch) continue;
       few.add("the connection of " + each.source + " to " + port.name +
-                  " is refused, because the two ports do not fit: " + *each.mismatch,
+                  " is refused: " + *each.mismatch,
               "nothing that is published at " + each.source + " is taken at " + port.name,
-              "give both ports one type, or take the connection out of the model");
+              "mend that in one of the two components, or take the connection out of the model");
     }
   }
 }
