@@ -1,7 +1,6 @@
 // Connecting, opening and closing ports, questions and answers.
 #include "client/node/node_core.hpp"
 
-#include <poll.h>
 #include <sys/epoll.h>
 #include <sys/socket.h>
 #include <sys/timerfd.h>
@@ -169,43 +168,6 @@ NodeCore::Socket NodeCore::socket() {
 std::shared_ptr<SharedMemory> NodeCore::memory() {
   const std::lock_guard lock(mutex_);
   return memory_;
-}
-
-void NodeCore::say(const wire::Message& message, Outbox::Descriptors descriptors) noexcept {
-  if (socket_ == nullptr) return;
-  const bool waited = !outbox_.empty();
-  if (!outbox_.send(socket_->get(), message, descriptors)) return lose_daemon();
-  if (!waited && !outbox_.empty()) heed_room(true);
-}
-
-void NodeCore::say_what_waits() noexcept {
-  if (socket_ == nullptr || outbox_.empty()) return;
-  if (!outbox_.flush(socket_->get())) return lose_daemon();
-  if (outbox_.empty()) heed_room(false);
-}
-
-// The end: a daemon that is only busy is to hear which ports have been closed.
-void NodeCore::say_the_rest() noexcept {
-  const auto give_up = Clock::now() + kMinAnswerTime;
-  for (;;) {
-    say_what_waits();
-    const auto left = std::chrono::ceil<milliseconds>(give_up - Clock::now());
-    if (socket_ == nullptr || outbox_.empty() || left.count() <= 0) return;
-    pollfd room{socket_->get(), POLLOUT, 0};
-    static_cast<void>(::poll(&room, 1, static_cast<int>(left.count())));
-  }
-}
-
-void NodeCore::heed_room(bool is_wanted) const noexcept {
-  epoll_event event{};
-  event.events = EPOLLIN | (is_wanted ? EPOLLOUT : 0u);
-  epoll_ctl(epoll_.get(), EPOLL_CTL_MOD, socket_->get(), &event);
-}
-
-void NodeCore::say_closed(shm::PortInstance port) noexcept {
-  wire::Message message = message_of(wire::MessageKind::kClosePort);
-  message.port = port;
-  say(message);
 }
 
 void NodeCore::forget_port(shm::PortInstance port) {

@@ -4,6 +4,7 @@
 //   notices.cpp       what the component should know
 //   service.cpp       what the daemon says, and the thread that hears it
 //   links.cpp         what it says of the ports at the other end
+//   say.cpp           what the node says
 //   rejoin.cpp        losing the daemon, and coming back to another; ending without one
 //   descriptions.cpp  what components say of their ports
 //   taps.cpp          taps that this node opens, and taps of its output ports

@@ -5,6 +5,8 @@
 #include <exception>
 #include <utility>
 
+#include "shm/descendants.hpp"
+
 namespace arbiter::detail {
 
 void make_non_blocking(const shm::FileDescriptor& socket) noexcept {

@@ -1,0 +1,54 @@
+// What the node says to the daemon, without ever waiting for it but at the end.
+#include <poll.h>
+#include <sys/epoll.h>
+
+#include <chrono>
+
+#include "client/node/node_core.hpp"
+
+namespace arbiter::detail {
+namespace {
+
+constexpr std::chrono::milliseconds kPatienceAtEnd{1000};
+
+}  // namespace
+
+void NodeCore::say(const wire::Message& message, Outbox::Descriptors descriptors) noexcept {
+  if (socket_ == nullptr) return;
+  const bool waited = !outbox_.empty();
+  if (!outbox_.send(socket_->get(), message, descriptors)) return lose_daemon();
+  if (!waited && !outbox_.empty()) heed_room(true);
+}
+
+void NodeCore::say_what_waits() noexcept {
+  if (socket_ == nullptr || outbox_.empty()) return;
+  if (!outbox_.flush(socket_->get())) return lose_daemon();
+  if (outbox_.empty()) heed_room(false);
+}
+
+// The end: a daemon that is only busy is to hear which ports have been closed.
+void NodeCore::say_the_rest() noexcept {
+  const auto give_up = Clock::now() + kPatienceAtEnd;
+  for (;;) {
+    say_what_waits();
+    const auto left = std::chrono::ceil<std::chrono::milliseconds>(give_up - Clock::now());
+    if (socket_ == nullptr || outbox_.empty() || left.count() <= 0) return;
+    pollfd room{socket_->get(), POLLOUT, 0};
+    static_cast<void>(::poll(&room, 1, static_cast<int>(left.count())));
+  }
+}
+
+void NodeCore::heed_room(bool is_wanted) const noexcept {
+  epoll_event event{};
+  event.events = EPOLLIN | (is_wanted ? EPOLLOUT : 0u);
+  epoll_ctl(epoll_.get(), EPOLL_CTL_MOD, socket_->get(), &event);
+}
+
+void NodeCore::say_closed(shm::PortInstance port) noexcept {
+  wire::Message message;
+  message.kind = wire::MessageKind::kClosePort;
+  message.port = port;
+  say(message);
+}
+
+}  // namespace arbiter::detail
