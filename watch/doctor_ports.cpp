@@ -68,8 +68,9 @@ void add_useless_winners(const wire::Status& status, Findings& found) {
     if (!port.cannot_deliver) continue;
     const auto& [source, why] = *port.cannot_deliver;
     if (has_mismatch(port, source)) continue;  // that is told
-    few.add(source + " is selected at " + port.name + " and cannot deliver: " + why,
-            port.name + " is idle, though the model has somebody command it",
+    std::string what = source;
+    what.append(" is selected at ").append(port.name).append(" and cannot deliver: ").append(why);
+    few.add(std::move(what), port.name + " is idle, though the model has somebody command it",
             "arbiter why " + port.name + " " + source + " says what stands in its way");
   }
 }
