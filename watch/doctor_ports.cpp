@@ -11,6 +11,7 @@
 #include "rules/text/names.hpp"
 #include "shm/clock.hpp"
 #include "watch/doctor.hpp"
+#include "watch/past.hpp"
 #include "watch/process.hpp"
 #include "watch/span.hpp"
 
@@ -75,23 +76,6 @@ void add_useless_winners(const wire::Status& status, Findings& found) {
   }
 }
 
-bool is_wanted(const auto* port) {
-  return port != nullptr && port->mentioned && !port->open && !port->away_pid;
-}
-
-// Whoever had the port open then has died since: that is told of.
-bool has_died_since(const wire::Status& status, const wire::RefusalStatus& refusal) {
-  for (const wire::DeathStatus& death : status.deaths) {
-    if (death.at < refusal.at) return false;  // the latest come first
-    const auto& ports = refusal.output ? death.outputs : death.inputs;
-    const std::string& name = refusal.output ? *refusal.output : refusal.input.value_or("");
-    for (const std::string& port : ports) {
-      if (port == name) return true;
-    }
-  }
-  return false;
-}
-
 struct RefusedPorts {
   const wire::RefusalStatus* last;
   std::vector<std::string> ports;
@@ -102,9 +86,9 @@ std::vector<RefusedPorts> refused_ports(const wire::Status& status) {
   std::vector<RefusedPorts> result;
   std::map<std::pair<std::int32_t, std::string>, std::size_t> places;
   for (const wire::RefusalStatus& each : status.refusals) {
-    const bool is_left = each.output ? is_wanted(status.find_source(*each.output))
-                                     : each.input && is_wanted(status.find_input(*each.input));
-    if (!is_left || has_died_since(status, each)) continue;
+    const bool is_left = each.output ? is_vacant(status.find_source(*each.output))
+                                     : each.input && is_vacant(status.find_input(*each.input));
+    if (!is_left || has_died_since(status, each.output ? kOutputEnd : kInputEnd, each)) continue;
     const auto [found, is_new] = places.try_emplace({each.pid, each.node}, result.size());
     if (is_new) result.push_back({&each, {}});
     result[found->second].ports.push_back(each.output ? *each.output : *each.input);
@@ -128,7 +112,7 @@ void add_refused(const wire::Status& status, Findings& found) {
 void add_near_names(const auto& ports, FewFindings& few) {
   std::vector<std::string_view> wanted;
   for (const auto& port : ports) {
-    if (is_wanted(&port)) wanted.push_back(port.name);
+    if (is_vacant(&port)) wanted.push_back(port.name);
   }
   if (wanted.empty()) return;
   std::size_t compared = 0;

@@ -8,7 +8,9 @@
 
 #include "rules/text/names.hpp"
 #include "shm/clock.hpp"
+#include "shm/type_info.hpp"
 #include "shm/utf8.hpp"
+#include "watch/past.hpp"
 #include "watch/process.hpp"
 #include "watch/span.hpp"
 
@@ -50,12 +52,13 @@ void add_outside(const std::string& name, const char* how, const auto& open,
   }
 }
 
-// Whether it is not for their types that two ports are not connected.
-bool types_fit(const std::optional<wire::SampleType>& sent,
-               const std::optional<wire::SampleType>& taken) {
-  if (!taken) return true;
-  return sent && sent->name == taken->name && sent->alignment == taken->alignment &&
-         (sent->size == taken->size || taken->alignment == 0);
+shm::TypeInfo type_info(const std::optional<wire::SampleType>& type) {
+  shm::TypeInfo info;
+  if (!type) return info;
+  info.set_name(type->name);
+  info.size = type->size;
+  info.alignment = type->alignment;
+  return info;
 }
 
 // Why the queue has fewer places than the input port has asked for; empty: it has as many.
@@ -69,34 +72,6 @@ std::string shorter_queue(const wire::ConnectionStatus& connection,
 
 bool contains(const std::vector<std::string>& names, const std::string& name) {
   return std::find(names.begin(), names.end(), name) != names.end();
-}
-
-// By which end of a port it is found what has become of it.
-struct PortEnd {
-  std::optional<std::string> wire::RefusalStatus::*refused;
-  std::vector<std::string> wire::DeathStatus::*left_open;
-};
-constexpr PortEnd kOutput{&wire::RefusalStatus::output, &wire::DeathStatus::outputs};
-constexpr PortEnd kInput{&wire::RefusalStatus::input, &wire::DeathStatus::inputs};
-
-// Who had the port open last and died; null: nobody, as far as the daemon remembers.
-const wire::DeathStatus* death_of(const wire::Status& status, const PortEnd& end,
-                                  const std::string& port) {
-  const auto found =
-      std::find_if(status.deaths.begin(), status.deaths.end(),
-                   [&](const auto& each) { return contains(each.*end.left_open, port); });
-  const bool is_last = found != status.deaths.end() && !contains(found->opened_since, port);
-  return is_last ? &*found : nullptr;
-}
-
-// Who has asked for the port in vain last; null: nobody, or only while another had it who has died.
-const wire::RefusalStatus* refusal_of(const wire::Status& status, const PortEnd& end,
-                                      const std::string& port) {
-  const auto found = std::find_if(status.refusals.begin(), status.refusals.end(),
-                                  [&](const auto& each) { return each.*end.refused == port; });
-  if (found == status.refusals.end()) return nullptr;
-  const wire::DeathStatus* death = death_of(status, end, port);
-  return death != nullptr && found->at < death->at ? nullptr : &*found;
 }
 
 // "; gaze-control (pid 4711) had it open, and died 3 s ago", or nothing.
@@ -155,8 +130,8 @@ std::vector<Obstacle> Obstacles::of_port() const {
     add_away(*input_->away_pid, result);
   } else if (stranger == nullptr) {
     result.push_back({"port-not-open", "no component has the port open: nothing is taken" +
-                                           death_text(death_of(status_, kInput, port_))});
-    add_refusal(refusal_of(status_, kInput, port_), result);
+                                           death_text(death_of(status_, kInputEnd, port_))});
+    add_refusal(refusal_of(status_, kInputEnd, port_), result);
   }
   if (stranger != nullptr) add_unknown(*stranger, result);
   add_other_strangers(result);
@@ -221,8 +196,9 @@ std::vector<Obstacle> Obstacles::of_connection(const std::string& source) const 
   const wire::ConnectionStatus& connection = *found;
   const wire::SourceStatus* output = status_.find_source(source);
   if (connection.mismatch) {
-    const bool fits = is_open() && output != nullptr && output->open &&
-                      types_fit(output->open->type, input_->open->type);
+    const bool fits =
+        is_open() && output != nullptr && output->open &&
+        shm::type_mismatch(type_info(output->open->type), type_info(input_->open->type)).empty();
     const std::string what = fits ? "not connected: " : "not connected, the two ports do not fit: ";
     result.push_back({"type-mismatch", what + *connection.mismatch});
     return result;
@@ -289,8 +265,8 @@ void Obstacles::add_publisher(const std::string& source, std::vector<Obstacle>& 
     return;
   }
   if (stranger != nullptr) return;
-  const auto* refusal = refusal_of(status_, kOutput, source);
-  const auto* death = death_of(status_, kOutput, source);
+  const auto* refusal = refusal_of(status_, kOutputEnd, source);
+  const auto* death = death_of(status_, kOutputEnd, source);
   const std::string not_open = "no component has the output port open";
   if (refusal != nullptr) {
     result.push_back({"output-not-open", not_open});
@@ -346,8 +322,8 @@ bool Obstacles::is_out_of_use(const std::string& source) const {
   const wire::SourceStatus* output = status_.find_source(source);
   return output != nullptr && !output->open && !output->away_pid &&
          stranger_with(&StrangerStatus::outputs, source) == nullptr &&
-         refusal_of(status_, kOutput, source) == nullptr &&
-         death_of(status_, kOutput, source) == nullptr &&
+         refusal_of(status_, kOutputEnd, source) == nullptr &&
+         death_of(status_, kOutputEnd, source) == nullptr &&
          sources_.state(source).word == shm::kNeverActive && !other_source(source);
 }
 
