@@ -45,6 +45,11 @@ bool Account::may_have_peers() const noexcept {
   return peers_ != 0;
 }
 
+void Account::set_place(std::string place) {
+  const std::lock_guard lock(mutex_);
+  place_ = std::move(place);
+}
+
 void Account::set_obstacle(std::string_view text) {
   const std::lock_guard lock(mutex_);
   obstacle_ = fitting(text, kMaxReason);
@@ -60,7 +65,7 @@ std::string Account::state_of_topic() const {
   if (!obstacle_.empty()) {
     text += ", " + obstacle_;
   } else if (peers_ == 0) {
-    text += ", no " + other_ + " matched";
+    text += ", no " + other_ + " matched" + place_;
   } else if (peers_ > 0) {
     text += (at_least_ ? ", at least " : ", ") + std::to_string(peers_) + " " + other_ +
             (peers_ == 1 ? "" : "s") + " matched";

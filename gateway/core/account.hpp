@@ -58,6 +58,8 @@ class Account {
   // How many at the other end are matched. Nothing is said of them where nobody has called this.
   // `at_least`: there may be more.
   void set_peers(std::uint32_t peers, bool at_least = false) noexcept;
+  // Where they are looked for, said behind "no publisher matched", such as " in domain 91".
+  void set_place(std::string place);
   // Whether somebody at the other end is matched, or may be: nobody knows.
   [[nodiscard]] bool may_have_peers() const noexcept;
   // What keeps the topic from working as a whole, such as "RouDi does not run"; empty: nothing.
@@ -82,6 +84,7 @@ class Account {
   const std::string outside_;
   const std::string other_;
   mutable std::mutex mutex_;
+  std::string place_;
   std::string obstacle_;
   std::string last_reason_;
   std::int64_t peers_ = -1;  // not known

@@ -42,13 +42,17 @@ class StandardError {
   // nobody reads it, only the first line waits, until the reader has caught up.
   void write(std::string line) {
     writer_.put(std::move(line));
-    is_unread_ = !writer_.wait(is_unread_ ? std::chrono::milliseconds(0) : kPatience);
+    const bool is_unread = is_unread_.load(std::memory_order_relaxed);
+    const bool is_read = writer_.wait(is_unread ? std::chrono::milliseconds(0) : kPatience);
+    is_unread_.store(!is_read, std::memory_order_relaxed);
   }
   void end() { writer_.wait(kPatienceAtEnd); }
 
  private:
   logging::LogWriter writer_;
-  std::atomic<bool> is_unread_ = false;
+  // Whoever says something writes it. Relaxed is enough: it is a hint how long to wait, and the
+  // lines themselves are under the writer's mutex.
+  std::atomic<bool> is_unread_{false};
 };
 
 // Never destroyed: threads may say something until the process ends.

@@ -45,6 +45,8 @@ EndPoint::EndPoint(End end, const Entry& entry, Account& account)
 
 void EndPoint::open(Domain& domain) {
   domain_ = &domain;
+  // Whoever is expected may be in another, which nobody sees from here.
+  account_.set_place(" in domain " + std::to_string(domain.id()));
   open();
 }
 
@@ -92,8 +94,9 @@ void EndPoint::look_at(const PeersOfTopic& peers) {
     find_obstacles(peers);
     seen_ = peers.revision;
   }
-  account_.set_peers(matched());
-  tell_obstacles();
+  const std::uint32_t count = matched();
+  account_.set_peers(count);
+  tell_obstacles(count);
   warn();
 }
 
@@ -176,14 +179,9 @@ void EndPoint::find_obstacles(const PeersOfTopic& peers) {
                     std::make_move_iterator(others.end()));
 }
 
-void EndPoint::tell_obstacles() {
-  const std::uint32_t count = matched();
+void EndPoint::tell_obstacles(std::uint32_t count) {
   if (obstacles_.empty()) {
-    // Whoever is expected may be in another domain, which nobody sees from here.
-    account_.set_obstacle(
-        count > 0 ? ""
-                  : std::string(which_ == End::kReader ? "no publisher" : "no subscriber") +
-                        " matched in domain " + std::to_string(domain_->id()));
+    account_.set_obstacle("");
     return;
   }
   // An obstacle takes the place of the number of peers.

@@ -74,7 +74,7 @@ class EndPoint {
   void choose_durability();
   void adopt_type_hash(const PeerMap& peers);
   void find_obstacles(const PeersOfTopic& peers);
-  void tell_obstacles();
+  void tell_obstacles(std::uint32_t count);  // of matched peers
   void warn();
 
   const End which_;
