@@ -27,11 +27,9 @@ void require_usable(const wire::Received& received) {
   }
 }
 
+// They are numbered one after the other.
 bool hands_back(wire::MessageKind kind) {
-  using wire::MessageKind;
-  return kind == MessageKind::kHandBackPage || kind == MessageKind::kHandBackOutput ||
-         kind == MessageKind::kHandBackInput || kind == MessageKind::kHandBackLink ||
-         kind == MessageKind::kHandedBack;
+  return kind >= wire::MessageKind::kHandBackPage && kind <= wire::MessageKind::kHandedBack;
 }
 
 // What is not said while components come back to a new daemon.

@@ -146,7 +146,7 @@ void NodeCore::rejoin() {
   }
   // Who has no ports left may be the last that has the memory, and with it what is active, and
   // which model is in force.
-  has_no_ports_ = ports.empty();
+  has_no_ports_ = ports.empty();  // as asked_, of the thread that pumps alone
   asked_ = shm::monotonic_now();
   if (!hand_back(*socket, ports)) return;
   make_non_blocking(*socket);
@@ -246,7 +246,8 @@ void NodeCore::say_who_has_ended() noexcept {
       message.kind = wire::MessageKind::kNodeEnded;
       message.link = ended;
       say(message);
-      if (socket_ == nullptr || has_hung_up(*socket_)) {  // to the next daemon, then
+      // What waits in the outbox may be lost with the conversation: it is said again, then.
+      if (socket_ == nullptr || !outbox_.empty() || has_hung_up(*socket_)) {
         remember_ended(board, ended);
         return;
       }
