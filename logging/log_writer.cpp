@@ -1,6 +1,5 @@
 #include "logging/log_writer.hpp"
 
-#include <fcntl.h>
 #include <poll.h>
 #include <signal.h>
 #include <sys/stat.h>
@@ -120,7 +119,7 @@ LogWriter::LogWriter(int fd, std::optional<JournalSocket> journal)
       needs_reader_(has_journal_ || !is_regular_file(fd)),
       shared_(std::make_shared<Shared>()) {
   shared_->journal = std::move(journal);
-  shared_->own.reset(fcntl(fd, F_DUPFD_CLOEXEC, 0));
+  shared_->own = shm::duplicate(fd);
   if (!shared_->own)
     throw std::system_error(errno, std::generic_category(), "no log can be written");
   shared_->fd = shared_->own.get();

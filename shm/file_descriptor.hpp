@@ -1,6 +1,7 @@
 // An owned file descriptor.
 #pragma once
 
+#include <fcntl.h>
 #include <unistd.h>
 
 #include <atomic>
@@ -76,5 +77,10 @@ class FileDescriptor {
  private:
   int fd_ = -1;
 };
+
+// Another descriptor of what `fd` is one of. Empty, with errno: there is none left.
+[[nodiscard]] inline FileDescriptor duplicate(int fd) noexcept {
+  return FileDescriptor(::fcntl(fd, F_DUPFD_CLOEXEC, 0));
+}
 
 }  // namespace arbiter::shm

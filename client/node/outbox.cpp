@@ -31,7 +31,7 @@ bool Outbox::keep(const wire::Message& message, Descriptors descriptors) noexcep
   if (waiting_.size() == kMostWaiting) return false;
   Waiting waiting{message, {}};
   for (std::size_t i = 0; i < descriptors.size() && descriptors[i] >= 0; ++i) {
-    waiting.descriptors[i].reset(fcntl(descriptors[i], F_DUPFD_CLOEXEC, 0));
+    waiting.descriptors[i] = shm::duplicate(descriptors[i]);
     if (!waiting.descriptors[i]) return false;
     shm::close_in_children(waiting.descriptors[i]);
   }

@@ -3,7 +3,6 @@
 // All that data needs to flow is mapped already, so for the ports nothing changes. The next daemon
 // is handed back the memory that the last one made, and told of each port and its links
 // (service/takeover/takeover.hpp).
-#include <fcntl.h>
 #include <linux/sockios.h>
 #include <poll.h>
 #include <sys/epoll.h>
@@ -44,11 +43,7 @@ bool is_sent(const shm::FileDescriptor& socket, const wire::Message& message,
   return wire::send_message(socket.get(), message, descriptors) == wire::SendResult::kSent;
 }
 
-// A descriptor of our own, for the port may be closed while it is on its way.
-shm::FileDescriptor duplicate(const shm::FileDescriptor& descriptor) {
-  return shm::FileDescriptor(fcntl(descriptor.get(), F_DUPFD_CLOEXEC, 0));
-}
-
+// With descriptors of our own, for the port may be closed while it is on its way.
 template <class Core>
 PortAtHand port_at_hand(wire::MessageKind kind, const Core& core, std::uint32_t id,
                         const shm::FileDescriptor& second) {
@@ -58,8 +53,8 @@ PortAtHand port_at_hand(wire::MessageKind kind, const Core& core, std::uint32_t 
   port.message.id = id;
   port.message.type = core.type();
   port.message.set_name(core.name());
-  port.first = duplicate(core.segment_descriptor());
-  port.second = duplicate(second);
+  port.first = shm::duplicate(core.segment_descriptor().get());
+  port.second = shm::duplicate(second.get());
   port.links = core.held_links();
   return port;
 }

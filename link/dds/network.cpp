@@ -1,6 +1,5 @@
 #include "link/dds/network.hpp"
 
-#include <fcntl.h>
 #include <sys/socket.h>
 
 #include <algorithm>
@@ -93,7 +92,7 @@ Domain::Domain(const NetworkOptions& options) {
   std::set_difference(now.begin(), now.end(), before.begin(), before.end(),
                       std::back_inserter(made));
   for (const int socket : made) {
-    shm::FileDescriptor own(::fcntl(socket, F_DUPFD_CLOEXEC, 0));
+    shm::FileDescriptor own = shm::duplicate(socket);
     if (own) sockets_.push_back(std::move(own));
   }
 }

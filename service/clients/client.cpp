@@ -1,6 +1,5 @@
 #include "service/clients/client.hpp"
 
-#include <fcntl.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
 #include <sys/syscall.h>
@@ -131,7 +130,7 @@ void Client::send(const wire::Message& message,
   queued->bytes = shares_.take(user_, Share::kQueue, sizeof(Queued));
   queued->open = shares_.take(user_, Share::kDescriptors, count);
   for (std::size_t i = 0; i < descriptors.size() && descriptors[i] >= 0; ++i) {
-    queued->descriptors[i].reset(fcntl(descriptors[i], F_DUPFD_CLOEXEC, 0));
+    queued->descriptors[i] = shm::duplicate(descriptors[i]);
     if (!queued->descriptors[i]) {
       log_event({EventKind::kGivenUp, {name}}, log::level::warn,
                 "{} cannot be sent a message, and is given up: {} (the limit is RLIMIT_NOFILE, "

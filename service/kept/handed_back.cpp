@@ -4,21 +4,11 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include <cerrno>
 #include <stdexcept>
-#include <system_error>
 
 #include "shm/segment.hpp"
 
 namespace arbiter::service {
-
-FileIdentity FileIdentity::of(const shm::FileDescriptor& file) {
-  struct stat status {};
-  if (fstat(file.get(), &status) != 0) {
-    throw std::system_error(errno, std::generic_category(), "looking at a segment");
-  }
-  return {status.st_dev, status.st_ino};
-}
 
 shm::FileDescriptor reopen_inherited(const shm::FileDescriptor& handed_back, std::size_t size) {
   if (shm::checked_size(handed_back, shm::Seals::kFixedSize) != size) {

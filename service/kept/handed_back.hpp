@@ -1,25 +1,15 @@
 // Memory that clients hand back to the next daemon.
 //
 // It is believed only if it is what the predecessor made: a memfd of our own user with the identity
-// that the predecessor wrote down in the runtime directory, where nobody else may write.
+// that the predecessor wrote down in the runtime directory (state_file.hpp), where nobody else may
+// write.
 #pragma once
-
-#include <sys/types.h>
 
 #include <cstddef>
 
 #include "shm/file_descriptor.hpp"
 
 namespace arbiter::service {
-
-// Which file a descriptor is open on.
-struct FileIdentity {
-  dev_t device = 0;
-  ino_t inode = 0;
-
-  static FileIdentity of(const shm::FileDescriptor& file);
-  friend bool operator==(const FileIdentity&, const FileIdentity&) = default;
-};
 
 // Opens for writing what a daemon of this user made and clients may only read. Throws
 // std::runtime_error where it is not that.

@@ -7,15 +7,15 @@
 #include <string>
 #include <vector>
 
-#include "service/kept/handed_back.hpp"
 #include "service/kept/process.hpp"
+#include "shm/segment.hpp"
 
 namespace arbiter::service {
 
 // The board and the registry that the clients of an instance map.
 struct Realm {
-  FileIdentity board;
-  FileIdentity registry;
+  shm::SegmentIdentity board;
+  shm::SegmentIdentity registry;
   friend bool operator==(const Realm&, const Realm&) = default;
 };
 

@@ -33,7 +33,7 @@ void require_descriptors(const wire::Received& open, std::size_t descriptors) {
 }
 
 shm::FileDescriptor kept(const shm::FileDescriptor& descriptor) {
-  shm::FileDescriptor copy(fcntl(descriptor.get(), F_DUPFD_CLOEXEC, 0));
+  shm::FileDescriptor copy = shm::duplicate(descriptor.get());
   if (!copy) throw std::system_error(errno, std::generic_category(), "keeping a descriptor");
   return copy;
 }

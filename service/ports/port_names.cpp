@@ -14,6 +14,7 @@
 #include "service/kept/step.hpp"
 #include "shm/assertion.hpp"
 #include "shm/limits.hpp"
+#include "shm/segment.hpp"
 #include "shm/table_ring.hpp"
 
 namespace arbiter::service {
@@ -109,7 +110,7 @@ void PortNames::restore(std::uint64_t generation) {
 bool PortNames::take_page(shm::SourceId id, const shm::FileDescriptor& page) {
   Source* source = source_by_id(id);
   if (source == nullptr || source->name.empty() ||
-      FileIdentity::of(page).inode != registry_.source(id).page_inode(source->page_number)) {
+      shm::identity_of(page).inode != registry_.source(id).page_inode(source->page_number)) {
     return false;
   }
   if (source->has_page()) return true;
@@ -147,7 +148,7 @@ void PortNames::forget_lost_pages(const shm::TableView& table) {
 void PortNames::replace_lost_page(Source& source) {
   Page page = make_page();
   const shm::PageNumber number = source.page_number + 1;
-  registry_.source(source.id).set_page(number, FileIdentity::of(page.writable).inode, {});
+  registry_.source(source.id).set_page(number, shm::identity_of(page.writable).inode, {});
   at_step("lost-page-registered");
   board_.give_page(source.id, number);
   at_step("lost-page-numbered");
@@ -182,7 +183,7 @@ void PortNames::prepare_page(Source& source, PageUser user) {
 // which, and what the registry says of both is there before it.
 void PortNames::change_page(Source& source, PageUser user) {
   const shm::PageNumber number = source.page_number + 1;
-  registry_.source(source.id).set_page(number, FileIdentity::of(source.next.writable).inode, user);
+  registry_.source(source.id).set_page(number, shm::identity_of(source.next.writable).inode, user);
   at_step("next-page-registered");
   board_.change_page(source.id, source.activity(), source.activity_on(source.next));
   at_step("page-changed");
@@ -331,7 +332,7 @@ Source& PortNames::source(const std::string& name, PageUser user) {
   source.page_charge = std::move(page_charge);
   // A page of its own: who had the last one of this id open may still write there.
   const shm::PageNumber number = source.page_number + 1;
-  registry_.source(source.id).set_page(number, FileIdentity::of(page.writable).inode, {});
+  registry_.source(source.id).set_page(number, shm::identity_of(page.writable).inode, {});
   at_step("first-page-registered");
   board_.give_page(source.id, number);
   at_step("first-page-numbered");

@@ -28,8 +28,8 @@ constexpr shm::Nanoseconds kMaxWaitForDeath = 100'000'000;
 bool Takeover::knows(const shm::FileDescriptor& board) const {
   if (!board) return false;
   const auto known =
-      phase_ == Phase::kExpecting ? predecessor_->realm.board : FileIdentity::of(board_.readable());
-  return FileIdentity::of(board) == known;
+      phase_ == Phase::kExpecting ? predecessor_->realm.board : shm::identity_of(board_.readable());
+  return shm::identity_of(board) == known;
 }
 
 void Takeover::rejoin(Client& client, const wire::Received& hello) {
@@ -47,12 +47,12 @@ void Takeover::rejoin(Client& client, const wire::Received& hello) {
 
 void Takeover::take_back(Client& client, const wire::Received& hello) {
   if (phase_ == Phase::kExpecting) {
-    if (!(Realm{FileIdentity::of(hello.descriptors[0]), FileIdentity::of(hello.descriptors[1])} ==
+    if (!(Realm{shm::identity_of(hello.descriptors[0]), shm::identity_of(hello.descriptors[1])} ==
           predecessor_->realm)) {
       throw std::runtime_error("this daemon's predecessor had other memory");
     }
     inherit(hello.descriptors[0], hello.descriptors[1]);
-  } else if (!(FileIdentity::of(hello.descriptors[0]) == FileIdentity::of(board_.readable()))) {
+  } else if (!(shm::identity_of(hello.descriptors[0]) == shm::identity_of(board_.readable()))) {
     throw std::runtime_error("this daemon does not know the ports of \"" + client.name +
                              "\", which another daemon has opened; restart the component");
   }

@@ -254,7 +254,7 @@ void Takeover::remember_components() noexcept {
           absentee.started != 0 ? absentee.started : start_of_process(absentee.pid);
       components.push_back({absentee.pid, started});
     }
-    state_.write({FileIdentity::of(board_.readable()), FileIdentity::of(registry_.readable())},
+    state_.write({shm::identity_of(board_.readable()), shm::identity_of(registry_.readable())},
                  components);
     if (std::exchange(write_again_at_, shm::kForever) == shm::kForever) return;
     log::info("what the next daemon needs to take over is written down again");
