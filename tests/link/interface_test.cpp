@@ -126,19 +126,26 @@ TEST_F(Cable, AnInterfaceThatIsSwitchedOffAndOnIsUsedAgain) {
       "");
 }
 
+// On a thread whose network, and that of the threads it makes, is that place's.
+void run_in(const NetworkNamespace& place, const std::function<void()>& run) {
+  std::thread thread([&] {
+    const shm::FileDescriptor there(
+        ::open(("/proc/" + place.pid() + "/ns/net").c_str(), O_RDONLY | O_CLOEXEC));
+    ASSERT_EQ(::setns(there.get(), CLONE_NEWNET), 0);
+    run();
+  });
+  thread.join();
+}
+
 // Cyclone ends its threads by sending to its own address, which is gone: nobody has noticed yet.
 TEST_F(Cable, ANetworkEndsThoughItsAddressGoesJustThen) {
   Switch cables;
   const NetworkNamespace place;
   cables.connect(place, kHead);
-  std::thread thread([&] {
-    const shm::FileDescriptor there(
-        ::open(("/proc/" + place.pid() + "/ns/net").c_str(), O_RDONLY | O_CLOEXEC));
-    ASSERT_EQ(::setns(there.get(), CLONE_NEWNET), 0);  // of this thread, and of those it makes
+  run_in(place, [&] {
     const link::Network network({43, {"eth0"}, {}});
     place.ip("addr flush dev eth0");
   });
-  thread.join();
 }
 
 // Whoever changes interfaces all the time must not keep a link from joining: what is left over is
@@ -147,10 +154,7 @@ TEST_F(Cable, OfManyChangesALinkHearsSomeBeforeItJoins) {
   Switch cables;
   const NetworkNamespace place;
   cables.connect(place, kHead);
-  std::thread thread([&] {
-    const shm::FileDescriptor there(
-        ::open(("/proc/" + place.pid() + "/ns/net").c_str(), O_RDONLY | O_CLOEXEC));
-    ASSERT_EQ(::setns(there.get(), CLONE_NEWNET), 0);  // of this thread
+  run_in(place, [&] {
     link::InterfaceWatch watch({"eth0"});
     for (int i = 0; i < 50; ++i) {
       place.ip("addr del 10.77.0.1/24 dev eth0");
@@ -161,7 +165,6 @@ TEST_F(Cable, OfManyChangesALinkHearsSomeBeforeItJoins) {
     EXPECT_EQ(watch.change(), "a network interface was gone");
     EXPECT_EQ(watch.change(), "");
   });
-  thread.join();
 }
 
 void drive_by_peers(const CabledRobot& robot, const std::vector<int>& peers_of_head,
