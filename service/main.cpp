@@ -16,10 +16,11 @@
 #include <CLI/CLI.hpp>
 
 #include "command_line/wrong_use.hpp"
+#include "logging/journal.hpp"
+#include "logging/log_writer.hpp"
 #include "rules/text/names.hpp"
 #include "service/daemon.hpp"
 #include "service/log/event.hpp"
-#include "service/log/journal.hpp"
 #include "service/log/log.hpp"
 #include "service/log/log_sink.hpp"
 #include "service/models/preparation.hpp"
@@ -69,8 +70,8 @@ void keep_files_from_others() { umask(umask(0) | S_IWGRP | S_IWOTH); }
 
 // None where standard error does not lead to it. Its socket lies elsewhere in tests, and in a
 // container that has it from outside.
-std::optional<arbiter::service::JournalSocket> find_journal() {
-  using namespace arbiter::service;
+std::optional<arbiter::logging::JournalSocket> find_journal() {
+  using namespace arbiter::logging;
   if (!is_journal(STDERR_FILENO, std::getenv("JOURNAL_STREAM"))) return {};
   const char* const path = std::getenv("ARBITER_JOURNAL_SOCKET");
   return JournalSocket(path != nullptr ? path : kJournalSocket);
@@ -81,8 +82,8 @@ class Log {
  public:
   explicit Log(const std::string& level) {
     using namespace arbiter::service;
-    auto sink =
-        std::make_shared<LogSink>(std::make_shared<LogWriter>(STDERR_FILENO, find_journal()));
+    auto sink = std::make_shared<LogSink>(
+        std::make_shared<arbiter::logging::LogWriter>(STDERR_FILENO, find_journal()));
     log::set_default_logger(std::make_shared<log::logger>("arbiterd", std::move(sink)));
     log::set_level(log::level::from_str(level));
   }

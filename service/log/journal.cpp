@@ -2,6 +2,7 @@
 
 #include <vector>
 
+#include "logging/journal.hpp"
 #include "shm/utf8.hpp"
 
 namespace arbiter::service {

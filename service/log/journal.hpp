@@ -8,14 +8,9 @@
 #include <string>
 #include <string_view>
 
-#include "logging/journal.hpp"
 #include "service/log/event.hpp"
 
 namespace arbiter::service {
-
-using logging::is_journal;
-using logging::JournalSocket;
-using logging::kJournalSocket;
 
 // How many bytes of names a record has: who closes a thousand ports at once gets no larger share of
 // the log.

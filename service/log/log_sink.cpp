@@ -65,7 +65,7 @@ std::optional<LogShares::LeftOut> LogShares::next_left_out(Time now) {
   return result;
 }
 
-LogSink::LogSink(std::shared_ptr<LogWriter> writer) : writer_(std::move(writer)) {}
+LogSink::LogSink(std::shared_ptr<logging::LogWriter> writer) : writer_(std::move(writer)) {}
 
 void LogSink::sink_it_(const spdlog::details::log_msg& message) {
   while (const auto left_out = shares_.next_left_out(message.time)) {

@@ -23,8 +23,6 @@
 
 namespace arbiter::service {
 
-using logging::LogWriter;
-
 // While it lives, what this thread logs is charged to a user. They nest; the inner one counts.
 class LogAccount {
  public:
@@ -72,7 +70,7 @@ class LogShares {
 
 class LogSink : public spdlog::sinks::base_sink<std::mutex> {
  public:
-  explicit LogSink(std::shared_ptr<LogWriter> writer);
+  explicit LogSink(std::shared_ptr<logging::LogWriter> writer);
 
  private:
   void sink_it_(const spdlog::details::log_msg& message) override;
@@ -81,7 +79,7 @@ class LogSink : public spdlog::sinks::base_sink<std::mutex> {
   void write(spdlog::details::log_msg message, std::string_view text, const Event* event,
              std::optional<uid_t> user);
 
-  std::shared_ptr<LogWriter> writer_;
+  std::shared_ptr<logging::LogWriter> writer_;
   LogShares shares_;
 };
 

@@ -13,6 +13,7 @@
 
 #include <arbiter/arbiter.hpp>
 
+#include "logging/journal.hpp"
 #include "logging/log_writer.hpp"
 #include "service/log/log_sink.hpp"
 #include "tests/client/component.hpp"
@@ -25,6 +26,9 @@
 namespace arbiter::service {
 namespace {
 
+using logging::is_journal;
+using logging::JournalSocket;
+using logging::LogWriter;
 using test::JournalRecord;
 using test::JournalServer;
 using test::TemporaryDirectory;

@@ -18,6 +18,7 @@
 namespace arbiter::service {
 namespace {
 
+using logging::LogWriter;
 using testing::HasSubstr;
 using testing::Not;
 using namespace std::chrono_literals;
