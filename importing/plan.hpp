@@ -13,16 +13,16 @@
 
 namespace arbiter::importing {
 
-// A lock's topic, which is two sources: one is published, and the other deactivated, by each
-// sample.
+// A lock's topic, one source: it is active by what one of the two Booleans says, and ended by the
+// other.
 struct Lock {
   std::string name;
   std::string topic;
-  std::string pressed, released;  // ports
-  shm::Nanoseconds timeout = 0;   // T of the one that is read
-  bool has_heartbeat = false;     // free while `released` is active; else, while `pressed` is not
-  std::string rank;               // "priority 100"
-  std::string silence;            // "no timeout", "timeout 0.5 s"
+  bool has_heartbeat = false;    // free while `released` is active; else, while `pressed` is not
+  std::string port;              // that source: "/e_stop/released:o"
+  shm::Nanoseconds timeout = 0;  // its T
+  std::string rank;              // "priority 100"
+  std::string silence;           // "no timeout", "timeout 0.5 s"
   rules::Location where;
 };
 

@@ -158,9 +158,8 @@ class TwistMuxImport {
         continue;
       }
       const std::string folder = assembly_.folder_of(entry, Assembly::Of::kLock);
-      lock.pressed = folder + "/pressed:o";
-      lock.released = folder + "/released:o";
       lock.has_heartbeat = !is_untimed(entry);
+      lock.port = folder + (lock.has_heartbeat ? "/released:o" : "/pressed:o");
       lock.timeout = activity_of(entry);
       lock.rank = rank_of(entry);
       lock.silence = silence_of(entry);

@@ -119,7 +119,7 @@ class ModelWriter {
     for (const Lock& lock : plan_.locks) {
       text_ += comment(
           lock.topic + ", " + lock.rank + ", " + lock.silence + ": " + line_of(lock.where), "  ");
-      write_source(lock.has_heartbeat ? lock.released : lock.pressed, lock.timeout);
+      write_source(lock.port, lock.timeout);
     }
     text_ += '\n';
   }
@@ -140,8 +140,8 @@ class ModelWriter {
   }
 
   void write_lock(const Lock& lock) {
-    const std::string condition = lock.has_heartbeat ? lock.released : "not " + lock.pressed;
-    text_ += "    <condition>" + escape(condition) + "</condition>  <!-- " +
+    text_ += "    <condition>" + escape((lock.has_heartbeat ? "" : "not ") + lock.port) +
+             "</condition>  <!-- " +
              in_comment(lock.name + ", " + lock.rank + ": " + line_of(lock.where)) + " -->\n";
   }
 
@@ -195,7 +195,7 @@ std::string write_mapping(const Plan& plan, const std::string& model_name) {
           "  ");
     }
     text += "  <in" + attribute("topic", lock.topic) + attribute("type", "std_msgs/msg/Bool") +
-            "\n     " + attribute("true", lock.pressed) + attribute("false", lock.released) +
+            "\n     " + attribute(lock.has_heartbeat ? "false" : "true", lock.port) +
             (lock.has_heartbeat ? qos : attribute("max_age", kOldestPress)) + "/>\n";
   }
   text += '\n';

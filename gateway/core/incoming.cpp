@@ -89,13 +89,17 @@ std::optional<Side> choose(const Choice& choice, const ForeignSample& sample) no
 Incoming::Incoming(Node& node, const Entry& entry, Account& account, std::size_t* first)
     : entry_(entry), account_(account) {
   const auto ports = entry.ports();
-  const std::array<std::optional<OutputPort<void>>*, 2> sides = {&yes_, &no_};
   const std::size_t begin = first == nullptr ? 0 : *first;
   for (std::size_t tried = 0; tried < ports.size(); ++tried) {
     const std::size_t at = (begin + tried) % ports.size();
     if (first != nullptr) *first = at;
-    sides.at(at)->emplace(open(node, ports[at]->name, entry));
+    port_of(*ports[at]).emplace(open(node, ports[at]->name, entry));
   }
+}
+
+std::optional<OutputPort<void>>& Incoming::port_of(const Port& port) noexcept {
+  const bool is_no = entry_.choice && entry_.choice->no && &port == &*entry_.choice->no;
+  return is_no ? no_ : yes_;
 }
 
 // publish() throws for another port's loan, which it never is.
@@ -107,14 +111,20 @@ Incoming::Fate Incoming::deliver(const ForeignSample& sample, Time deadline) noe
     fail();
     return Fate::kUnreadable;
   }
-  OutputPort<void>& chosen = *side == Side::kYes ? *yes_ : *no_;
-  OutputPort<void>& other = *side == Side::kYes ? *no_ : *yes_;
-  const Fate fate =
-      pass_to(chosen, sample, later(deadline, max_age_.more_of(*side == Side::kYes ? 0 : 1)));
+  auto& chosen = *side == Side::kYes ? yes_ : no_;
+  auto& other = *side == Side::kYes ? no_ : yes_;
+  Fate fate = Fate::kPassed;
+  if (chosen) {
+    const std::size_t number = *side == Side::kYes ? 0 : 1;
+    fate = pass_to(*chosen, sample, later(deadline, max_age_.more_of(number)));
+  } else {
+    account_.passed.add();
+    account_.set_last_size(sample.size());
+  }
   // Whatever has become of it: the topic's last word is not the other side. A late one makes
   // nothing active, but deactivations are never late.
-  other.deactivate();
-  if (fate == Fate::kUnreadable) chosen.deactivate();
+  if (other) other->deactivate();
+  if (fate == Fate::kUnreadable) chosen->deactivate();
   return fate;
 }
 
@@ -172,12 +182,12 @@ void Incoming::fail() noexcept {
 }
 
 void Incoming::deactivate_all() noexcept {
-  yes_->deactivate();
+  if (yes_) yes_->deactivate();
   if (no_) no_->deactivate();
 }
 
 void Incoming::describe(std::string_view text) {
-  yes_->describe(text);
+  if (yes_) yes_->describe(text);
   if (no_) no_->describe(text);
 }
 

@@ -53,15 +53,16 @@ class Incoming {
   // What became of a sample.
   enum class Fate { kPassed, kLate, kTooLarge, kUnreadable, kNoSlot };
 
-  // Opens the entry's port, or both. Keeps references. Throws arbiter::Error. `first`: the
+  // Opens the entry's port, or ports. Keeps references. Throws arbiter::Error. `first`: the
   // number of the port to begin with; left at the one that is refused, so that who tries again
   // does not open the other in vain.
   Incoming(Node& node, const Entry& entry, Account& account, std::size_t* first = nullptr);
 
   // One copy into Arbiter's memory, or to where it is sent from, and an arrival, unless `deadline`
   // has passed by then: that of max_age().get(). With a choice: an arrival at the source that the
-  // field chooses, whose own age counts, and then the end of the other's activity; where nothing
-  // can be chosen, of both. publish() throws for another port's loan, and this one is its own.
+  // field chooses, if the entry has it, whose own age counts, and then the end of the other's
+  // activity; where nothing can be chosen, of both. publish() throws for another port's loan, and
+  // this one is its own.
   Fate deliver(const ForeignSample& sample,  // NOLINT(bugprone-exception-escape)
                Time deadline) noexcept;
   // What deliver() publishes is what that `out` entry sends: deliver() then sends it there itself,
@@ -69,7 +70,7 @@ class Incoming {
   void follow(Outgoing& outgoing) noexcept {
     if (!entry_.choice) outgoing_.announce(outgoing);
   }
-  // A sample came that cannot be read at all. With a choice both sources end.
+  // A sample came that cannot be read at all. With a choice its sources end.
   void fail() noexcept;
 
   // How old a sample may be when it arrives. Written by MaxAges.
@@ -81,6 +82,7 @@ class Incoming {
   void describe(std::string_view text);
 
  private:
+  [[nodiscard]] std::optional<OutputPort<void>>& port_of(const Port& port) noexcept;
   Fate pass_on(const ForeignSample& sample,  // NOLINT(bugprone-exception-escape): as deliver()
                Time deadline) noexcept;
   // `outgoing`: null, or where this thread has the turn.
@@ -91,7 +93,8 @@ class Incoming {
   const Entry& entry_;
   Account& account_;
   MaxAge max_age_;
-  std::optional<OutputPort<void>> yes_;  // or the only one
+  // Without a choice the first; with one, what it has of the two.
+  std::optional<OutputPort<void>> yes_;
   std::optional<OutputPort<void>> no_;
   Announced<Outgoing> outgoing_;
 };

@@ -214,10 +214,7 @@ class MappingCheck {
         continue;
       }
       // Of the two sources that a topic chooses between, a model seldom needs both.
-      if (entry.choice &&
-          (right.contains(entry.choice->yes.name) || right.contains(entry.choice->no.name))) {
-        continue;
-      }
+      if (is_any_in(right, entry)) continue;
       std::vector<std::string_view> candidates;
       if (suggestions_++ < rules::kMaxSuggestions) candidates.assign(right.begin(), right.end());
       diagnostics_.warning(
@@ -227,6 +224,12 @@ class MappingCheck {
               rules::advise(port->name, candidates, "correct the name, or connect it in the model"),
           {.ports = {port->name}});
     }
+  }
+
+  static bool is_any_in(const std::set<std::string>& names, const Entry& entry) {
+    const auto ports = entry.ports();
+    return std::any_of(ports.begin(), ports.end(),
+                       [&](const Port* port) { return names.contains(port->name); });
   }
 
   // Of one that the model does not mention.

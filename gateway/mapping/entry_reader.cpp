@@ -148,7 +148,7 @@ class EntryReader {
     const int ways = (attributes_.has("port") ? 1 : 0) + (is_boolean ? 1 : 0) + (is_number ? 1 : 0);
     if (ways > 1) {
       reader_.error("several-ports", reader_.where(element_),
-                    "an entry has one port, or true and false, or above and below; remove the "
+                    "an entry has port, or true and false, or above and below; remove the "
                     "others, or write an entry for each");
       return;
     }
@@ -159,30 +159,33 @@ class EntryReader {
       if (auto port = attributes_.port("port")) entry_.port = std::move(*port);
       return;
     }
-    auto yes = attributes_.port(is_boolean ? "true" : "above");
-    auto no = attributes_.port(is_boolean ? "false" : "below");
     if (is_boolean) {
       refuse_without("threshold", "above");
       refuse_without("field", "above");
     }
+    const std::string_view yes = is_boolean ? "true" : "above";
+    const std::string_view no = is_boolean ? "false" : "below";
     Choice choice =
         read_field(attributes_, {entry_.dds.has_value(), entry_.type ? entry_.type->name : "",
                                  header(), known_size_, entry_.max_size});
-    if (!yes || !no) return;
-    if (yes->name == no->name) {
-      reader_.error("duplicate-port", no->where,
-                    "both sources are " + rules::quote(no->name) + "; name two");
+    if (attributes_.has(yes)) choice.yes = attributes_.port(yes);
+    if (attributes_.has(no)) choice.no = attributes_.port(no);
+    if (!choice.yes && !choice.no) return;
+    if (choice.yes && choice.no && choice.yes->name == choice.no->name) {
+      reader_.error("duplicate-port", choice.no->where,
+                    "both sources are " + rules::quote(choice.no->name) +
+                        "; name two, or leave one of the attributes out");
       return;
     }
-    choice.yes = std::move(*yes);
-    choice.no = std::move(*no);
     entry_.choice = std::move(choice);
   }
 
   void refuse_without(std::string_view name, std::string_view other) {
     if (!attributes_.has(name)) return;
     attributes_.error("misplaced-attribute", name,
-                      std::string(name) + "=\"…\" belongs to an entry with two sources; add " +
+                      std::string(name) +
+                          "=\"…\" belongs to an entry whose field chooses a "
+                          "source; add " +
                           std::string(other) + "=\"…\", or remove it");
   }
 

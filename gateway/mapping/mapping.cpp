@@ -87,9 +87,11 @@ Range range_of(Field field) {
 }
 
 std::vector<const Port*> Entry::ports() const {
-  if (choice) return {&choice->yes, &choice->no};
-  if (port) return {&*port};
-  return {};
+  std::vector<const Port*> ports;
+  if (port) ports.push_back(&*port);
+  if (choice && choice->yes) ports.push_back(&*choice->yes);
+  if (choice && choice->no) ports.push_back(&*choice->no);
+  return ports;
 }
 
 std::string Entry::outside() const {

@@ -51,8 +51,9 @@ struct Range {
 // A topic that is two sources: one is published, and the other deactivated, by what a field of the
 // sample says. So a Boolean, or a number on one side of a threshold, can be read by a condition.
 struct Choice {
-  Port yes;  // true; above the threshold
-  Port no;   // false; not above it
+  // One of the two at least: a model seldom asks for both.
+  std::optional<Port> yes;  // true; above the threshold
+  std::optional<Port> no;   // false; not above it
   Field field = Field::kBoolean;
   // In bytes, from the first byte of the sample's data: behind the encapsulation header of DDS,
   // behind the user header of iceoryx.

@@ -78,6 +78,15 @@ TEST(CheckMapping, SamplesFromBeforeItCameAreForSourcesThatStayActive) {
       "<condition>not /EStop/pressed:o</condition></behavior></behaviors>";
   EXPECT_THAT(check(dds(lock), all_forever).findings(), IsEmpty());
   EXPECT_THAT(check(dds(lock), "").findings(), IsEmpty());  // T is not known
+  const std::string pressed =
+      "<in topic='/lock' type='std_msgs/msg/Bool' true='/EStop/pressed:o' qos='latched'/>";
+  EXPECT_THAT(check(dds(pressed),
+                    "<behaviors><source port='/EStop/pressed:o' timeout='forever'/>"
+                    "<behavior name='Drive'><config at='/Base/cmd:i'>/Nav/cmd:o"
+                    "</config><condition>not /EStop/pressed:o</condition></behavior>"
+                    "</behaviors>")
+                  .findings(),
+              IsEmpty());
   const Read read = check(dds(lock));
   ASSERT_THAT(read.findings(), ElementsAre(HasSubstr("error late-history")));
   EXPECT_THAT(read.message(), HasSubstr("T of \"/EStop/released:o\" is 500ms"));

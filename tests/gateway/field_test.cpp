@@ -10,12 +10,14 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
 
-TEST(Mapping, AnEntryHasOnePortOrTwoThatAFieldChooses) {
+TEST(Mapping, AnEntryHasOnePortOrThoseThatAFieldChooses) {
   const std::string topic = "<in topic='/a' type='std_msgs/msg/Bool' ";
   EXPECT_THAT(read_dds(topic + "port='/a:o' true='/b:o'/>").findings(),
               ElementsAre("1:21 error several-ports"));
-  EXPECT_THAT(read_dds(topic + "true='/b:o'/>").findings(),
-              ElementsAre("1:21 error missing-attribute"));
+  EXPECT_THAT(read_dds(topic + "true='/b:o' below='/c:o'/>").findings(),
+              ElementsAre("1:21 error several-ports"));
+  EXPECT_THAT(read_dds(topic + "true='/b:o' false='no name'/>").findings(),
+              ElementsAre("1:80 error invalid-port-name"));
   EXPECT_THAT(read_dds(topic + "true='/b:o' false='/b:o'/>").findings(),
               ElementsAre("1:80 error duplicate-port"));
   EXPECT_THAT(read_dds(topic + "above='/a:o' below='/b:o'/>").findings(),
@@ -28,6 +30,24 @@ TEST(Mapping, AnEntryHasOnePortOrTwoThatAFieldChooses) {
               ElementsAre("1:81 error misplaced-attribute"));
   EXPECT_THAT(read_dds(topic + "true='/a:o' false='/b:o' offset='65536'/>").findings(),
               ElementsAre("1:94 error invalid-value"));
+}
+
+// Most models ask for one of the two.
+TEST(Mapping, OneOfTwoSourcesIsEnough) {
+  const std::string topic = "<in topic='/a' type='std_msgs/msg/Bool' ";
+  const Read pressed = read_dds(topic + "true='/b:o'/>");
+  EXPECT_THAT(pressed.findings(), IsEmpty());
+  ASSERT_EQ(pressed.entry().ports().size(), 1u);
+  EXPECT_EQ(pressed.entry().choice->yes->name, "/b:o");
+  EXPECT_FALSE(pressed.entry().choice->no);
+  const Read released = read_dds(topic + "false='/b:o'/>");
+  EXPECT_THAT(released.findings(), IsEmpty());
+  EXPECT_FALSE(released.entry().choice->yes);
+  EXPECT_EQ(released.entry().choice->no->name, "/b:o");
+  const Read low = read_dds(
+      "<in topic='/a' type='std_msgs/msg/Float32' below='/b:o' threshold='1' field='f32'/>");
+  EXPECT_THAT(low.findings(), IsEmpty());
+  EXPECT_EQ(low.entry().choice->no->name, "/b:o");
 }
 
 // It would pass every check, and its sources would be silent for ever.

@@ -207,6 +207,48 @@ TEST_F(ArrivingBoolean, ALatePressCountsAsLongAsItsOwnSourceAllows) {
   EXPECT_FALSE(is_active("/released:o"));
 }
 
+// Of an entry with one of the two sources.
+class ArrivingRelease : public Arriving {
+ protected:
+  ArrivingRelease()
+      : Arriving("<in topic='/estop' type='std_msgs/msg/Bool' false='/released:o'/>") {}
+  Fate say(char value, Time deadline = kNever) {
+    return incoming_.deliver(BytesSample(std::string("\0\1\0\0", 4) + value, 4), deadline);
+  }
+};
+
+TEST_F(ArrivingRelease, TheOtherValueOnlyEndsTheSourceThatThereIs) {
+  EXPECT_EQ(say('\1'), Fate::kPassed);
+  EXPECT_FALSE(is_active("/released:o"));
+  EXPECT_EQ(say('\0'), Fate::kPassed);
+  EXPECT_TRUE(is_active("/released:o"));
+  EXPECT_EQ(say('\1', kPassed), Fate::kPassed) << "a deactivation is never late";
+  EXPECT_FALSE(is_active("/released:o"));
+  EXPECT_EQ(account_.passed.value(), 3u);
+  EXPECT_EQ(daemon_.source("/released:o")["published"], 1);
+}
+
+TEST_F(ArrivingRelease, WhatIsNoBooleanEndsIt) {
+  say('\0');
+  EXPECT_EQ(say('\2'), Fate::kUnreadable);
+  EXPECT_FALSE(is_active("/released:o"));
+}
+
+TEST_F(ArrivingRelease, OfANumberBelowAThresholdToo) {
+  const Read battery = read_dds(
+      "<in topic='/battery' type='std_msgs/msg/Float32' below='/low:o' threshold='0.25' "
+      "field='f32'/>");
+  Incoming incoming(node_, battery.entry(), account_);
+  const auto say = [&](float value) {
+    return incoming.deliver(BytesSample(std::string("\0\1\0\0", 4) + bytes_of<float>(value), 4),
+                            kNever);
+  };
+  EXPECT_EQ(say(0.25F), Fate::kPassed);
+  EXPECT_TRUE(is_active("/low:o"));
+  EXPECT_EQ(say(0.5F), Fate::kPassed);
+  EXPECT_FALSE(is_active("/low:o"));
+}
+
 Choice choice_of(Field field, long double threshold, std::size_t offset = 0) {
   Choice choice;
   choice.field = field;

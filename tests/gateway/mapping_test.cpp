@@ -128,8 +128,8 @@ TEST(Mapping, ABooleanTopicIsTwoSources) {
   ASSERT_THAT(read.findings(), IsEmpty());
   ASSERT_TRUE(read.entry().choice);
   EXPECT_FALSE(read.entry().port);
-  EXPECT_EQ(read.entry().choice->yes.name, "/EStop/pressed:o");
-  EXPECT_EQ(read.entry().choice->no.name, "/EStop/released:o");
+  EXPECT_EQ(read.entry().choice->yes->name, "/EStop/pressed:o");
+  EXPECT_EQ(read.entry().choice->no->name, "/EStop/released:o");
   EXPECT_EQ(read.entry().choice->field, Field::kBoolean);
 }
 

@@ -90,9 +90,10 @@ class ImportedRobot {
       return;
     }
     const bool is_yes = *side == gateway::Side::kYes;
-    const gateway::Choice& ports = *entry->choice;
-    happen(rules::TraceKind::kArrival, is_yes ? ports.yes.name : ports.no.name, now);
-    happen(rules::TraceKind::kDeactivation, is_yes ? ports.no.name : ports.yes.name, now);
+    const auto& chosen = is_yes ? entry->choice->yes : entry->choice->no;
+    const auto& other = is_yes ? entry->choice->no : entry->choice->yes;
+    if (chosen) happen(rules::TraceKind::kArrival, chosen->name, now);
+    if (other) happen(rules::TraceKind::kDeactivation, other->name, now);
   }
 
  private:

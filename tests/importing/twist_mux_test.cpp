@@ -86,13 +86,13 @@ TEST(TwistMux, AModelIsWrittenForPeople) {
 
   <!-- lock e_stop: a.yaml:5 -->
   <in topic="/e_stop" type="std_msgs/msg/Bool"
-      true="/e_stop/pressed:o" false="/e_stop/released:o"/>
+      false="/e_stop/released:o"/>
   <!-- lock pause: a.yaml:6 -->
   <!-- It is said once, and counts however late it comes: hence max_age, and no qos, so that a lost
        datagram is repeated. What is said while no gateway runs, or while it is stopped, may be
        lost. -->
   <in topic="/pause" type="std_msgs/msg/Bool"
-      true="/pause/pressed:o" false="/pause/released:o" max_age="86400s"/>
+      true="/pause/pressed:o" max_age="86400s"/>
 
   <out port="/base/cmd_vel:i" topic="/cmd_vel_out" type="geometry_msgs/msg/Twist" idle="zero"/>
 
@@ -241,7 +241,7 @@ TEST(TwistMux, ALockWithoutATimeoutIsHeardReliably) {
       "5}}, locks: {l: {topic: l, timeout: 0.0, priority: 9}}}}\n");
   ASSERT_TRUE(imported.plan);
   EXPECT_THAT(importing::write_mapping(*imported.plan, "m.xml"),
-              HasSubstr("false=\"/l/released:o\" max_age=\"86400s\"/>"));
+              HasSubstr("true=\"/l/pressed:o\" max_age=\"86400s\"/>"));
 }
 
 TEST(TwistMux, StampedTwistsAreTakenFromTheFile) {
@@ -270,7 +270,7 @@ TEST(TwistMux, NamesMayBeAnything) {
   ASSERT_TRUE(imported.plan) << testing::PrintToString(imported.findings());
   // The letter has two bytes. A topic and a lock of one name share a folder.
   EXPECT_EQ(imported.plan->commands.front().port, "/__/cmd_vel:o");
-  EXPECT_EQ(imported.plan->locks.front().pressed, "/__/pressed:o");
+  EXPECT_EQ(imported.plan->locks.front().port, "/__/released:o");
   EXPECT_EQ(imported.plan->commands[2].name, "x<&\"]]>_ y");
   EXPECT_EQ(imported.plan->commands[3].name, "x<&\"]]>_ y_2");
   ImportedRobot robot(*imported.plan);
