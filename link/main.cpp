@@ -106,12 +106,16 @@ void require_peers(const NetworkOptions& network) {
   }
 }
 
-int run(int argc, char** argv) {
+struct CommandLine {
   LinkOptions options;
-  options.host = watch::host_name();
-  options.version = ARBITER_VERSION;
-  gateway::set_program_name("arbiter-link");
-  CLI::App app("Joins the Arbiter of this host with those of other hosts.", "arbiter-link");
+  std::string max_age;
+
+  void describe(CLI::App& app);
+  // Throws CLI::ValidationError, and std::invalid_argument.
+  void judge();
+};
+
+void CommandLine::describe(CLI::App& app) {
   app.set_version_flag("--version", std::string("arbiter-link ") + ARBITER_VERSION);
   app.add_option(
       "--instance", options.instance,
@@ -133,7 +137,6 @@ int run(int argc, char** argv) {
          "A folder with the keys for DDS Security: HOST.pem, HOST_key.pem, identity_ca.pem, "
          "permissions_ca.pem, governance.p7s, permissions.p7s")
       ->check(CLI::ExistingDirectory);
-  std::string max_age;
   app.add_option("--max-age", max_age,
                  "How old a sample may be when it arrives, such as 100ms: where T is forever, or "
                  "longer than that; by default T, or for forever the model's timeout")
@@ -142,13 +145,47 @@ int run(int argc, char** argv) {
       "Example:\n  arbiter-link --interface eth0\n\n"
       "Exit codes: 0 ended by SIGINT or SIGTERM; 1 an error; 2 wrong use");
   app.failure_message(command_line::wrong_use_text);
+}
+
+void CommandLine::judge() {
+  options.instance = wire::instance_name(options.instance);
+  require_host_name(options.host);
+  require_interfaces(options.network.interfaces);
+  require_peers(options.network);
+  if (!max_age.empty()) options.max_age = read_max_age(max_age);
+  options.network.name = options.host;
+}
+
+// One link after the other, until a signal comes.
+void serve(const LinkOptions& options, const shm::FileDescriptor& stop) {
+  // A program that waits for an answer does not hold up the next link.
+  std::vector<std::future<void>> closing;
+  Neighbours known;
+  for (bool is_first = true;; is_first = false) {
+    Link link(options, std::move(known));
+    if (is_first) sd_notify(0, "READY=1");
+    if (link.run(stop.get()) == Link::End::kStopped) return;
+    std::erase_if(closing, [](const std::future<void>& each) {
+      return each.wait_for(std::chrono::seconds(0)) == std::future_status::ready;
+    });
+    auto desk = link.take_desk();
+    known = desk->known();
+    closing.push_back(
+        std::async(std::launch::async, [desk = std::move(desk)]() mutable { desk.reset(); }));
+  }
+}
+
+int run(int argc, char** argv) {
+  gateway::set_program_name("arbiter-link");
+  CLI::App app("Joins the Arbiter of this host with those of other hosts.", "arbiter-link");
+  CommandLine line;
+  line.options.host = watch::host_name();
+  line.options.version = ARBITER_VERSION;
+  line.options.on_round = [] { sd_notify(0, "WATCHDOG=1"); };
+  line.describe(app);
   try {
     app.parse(argc, argv);
-    options.instance = wire::instance_name(options.instance);
-    require_host_name(options.host);
-    require_interfaces(options.network.interfaces);
-    require_peers(options.network);
-    if (!max_age.empty()) options.max_age = read_max_age(max_age);
+    line.judge();
   } catch (const CLI::Success& success) {
     return app.exit(success);
   } catch (const CLI::ParseError& error) {
@@ -158,24 +195,8 @@ int run(int argc, char** argv) {
     gateway::say(gateway::Level::kError, error.what());
     return kWrongUse;
   }
-  options.network.name = options.host;
-  const shm::FileDescriptor stop = gateway::catch_stop_signals();
-  options.on_round = [] { sd_notify(0, "WATCHDOG=1"); };
-  // A program that waits for an answer does not hold up the next link.
-  std::vector<std::future<void>> closing;
-  Neighbours known;
-  for (bool is_first = true;; is_first = false) {
-    Link link(options, std::move(known));
-    if (is_first) sd_notify(0, "READY=1");
-    if (link.run(stop.get()) == Link::End::kStopped) return 0;
-    std::erase_if(closing, [](const std::future<void>& each) {
-      return each.wait_for(std::chrono::seconds(0)) == std::future_status::ready;
-    });
-    auto desk = link.take_desk();
-    known = desk->known();
-    closing.push_back(
-        std::async(std::launch::async, [desk = std::move(desk)]() mutable { desk.reset(); }));
-  }
+  serve(line.options, gateway::catch_stop_signals());
+  return 0;
 }
 
 }  // namespace

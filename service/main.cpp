@@ -111,28 +111,26 @@ int check(const arbiter::service::DaemonOptions& options) {
   return 0;
 }
 
-int serve(const arbiter::service::DaemonOptions& options, const std::string& instance,
+int serve(const arbiter::service::DaemonOptions& options,
           const arbiter::shm::FileDescriptor& signals) {
   arbiter::shm::raise_descriptor_limit();  // components and sources take a few each
   Daemon daemon(options);
-  log_event({EventKind::kReady}, log::level::info, "instance \"{}\" is ready at {}", instance,
-            daemon.path());
-  for (const std::string& other : arbiter::wire::other_daemons(instance, options.directory)) {
+  log_event({EventKind::kReady}, log::level::info, "instance \"{}\" is ready at {}",
+            options.instance, daemon.path());
+  for (const std::string& other :
+       arbiter::wire::other_daemons(options.instance, options.directory)) {
     log::warn(
         "another daemon of instance \"{}\" listens at {}: components that meet there share nothing "
         "with those that meet here; stop one of the two, or give it another --instance",
-        instance, other);
+        options.instance, other);
   }
-  sd_notifyf(0, "READY=1\nSTATUS=instance %s", instance.c_str());
+  sd_notifyf(0, "READY=1\nSTATUS=instance %s", options.instance.c_str());
   daemon.run(signals.get());
   sd_notify(0, "STOPPING=1");
   return 0;
 }
 
-int run(int argc, char** argv) {
-  CLI::App app("arbiterd: decides at each input port whose data gets through", "arbiterd");
-  app.footer(kExample);
-  app.set_version_flag("--version", std::string("arbiterd ") + ARBITER_VERSION);
+struct CommandLine {
   arbiter::service::DaemonOptions options;
   std::vector<std::string> models;
   std::vector<std::string> applications;
@@ -141,6 +139,15 @@ int run(int argc, char** argv) {
   std::string level = "info";
   double effort = 1;
   bool only_checks = false;
+
+  void describe(CLI::App& app);
+  // What it says is in `options` then. Throws std::invalid_argument.
+  void judge();
+};
+
+void CommandLine::describe(CLI::App& app) {
+  app.footer(kExample);
+  app.set_version_flag("--version", std::string("arbiterd ") + ARBITER_VERSION);
   app.add_option("--model", models,
                  "Model file; several files with the same NAME, or without one, form one model. "
                  "The first model comes into force; `arbiter switch` goes to the others")
@@ -180,6 +187,19 @@ int run(int argc, char** argv) {
   app.add_option("--log-level", level, "trace, debug, info, warn or error")
       ->check(CLI::IsMember({"trace", "debug", "info", "warn", "error"}));
   app.failure_message(arbiter::command_line::wrong_use_text);
+}
+
+void CommandLine::judge() {
+  if (!policy.empty()) options.policy = policy;
+  options.steps = arbiter::rules::Budget::steps_of(effort);
+  options.models = arbiter::service::named_files(models, applications);
+  options.instance = arbiter::wire::instance_name(instance);
+}
+
+int run(int argc, char** argv) {
+  CLI::App app("arbiterd: decides at each input port whose data gets through", "arbiterd");
+  CommandLine line;
+  line.describe(app);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
@@ -187,17 +207,14 @@ int run(int argc, char** argv) {
   }
   keep_files_from_others();
   // Before there are threads: they inherit what is blocked.
-  const auto signals = only_checks ? arbiter::shm::FileDescriptor() : catch_signals();
-  const Log logging(level);
-  if (!policy.empty()) options.policy = policy;
-  options.steps = arbiter::rules::Budget::steps_of(effort);
+  const auto signals = line.only_checks ? arbiter::shm::FileDescriptor() : catch_signals();
+  const Log logging(line.level);
   try {
-    options.models = arbiter::service::named_files(models, applications);
-    options.instance = arbiter::wire::instance_name(instance);
-    if (only_checks) return check(options);
-    options.directory = arbiter::wire::daemon_directory();
-    options.stop_descriptor = signals.get();
-    return serve(options, options.instance, signals);
+    line.judge();
+    if (line.only_checks) return check(line.options);
+    line.options.directory = arbiter::wire::daemon_directory();
+    line.options.stop_descriptor = signals.get();
+    return serve(line.options, signals);
   } catch (const arbiter::rules::Stopped&) {  // by a signal, before it was ready
     return 0;
   } catch (const std::invalid_argument& error) {
