@@ -307,9 +307,7 @@ std::string Obstacles::why_nothing_comes_of(const std::string& source) const {
     return process_text(*stranger) + " has it open, but this daemon does not know that component";
   }
   const wire::ConnectionStatus* connection = connection_of(source);
-  if (connection != nullptr && connection->mismatch) {
-    return "the two ports do not fit, " + *connection->mismatch;
-  }
+  if (connection != nullptr && connection->mismatch) return *connection->mismatch;
   const wire::SourceStatus* output = status_.find_source(source);
   if (output == nullptr || !output->open) return "";
   if (output->open->published == 0 && output->open->signals != 0) {
