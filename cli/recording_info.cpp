@@ -55,6 +55,13 @@ nlohmann::json record_of(evidence::RecordKind kind, const recording::McapChannel
   return nlohmann::json::parse(message.data, nullptr, false);
 }
 
+// Empty: it has no such field.
+std::string text_of(const nlohmann::json& record, const char* name) {
+  if (!record.is_object()) return {};
+  const auto found = record.find(name);
+  return found != record.end() && found->is_string() ? found->get<std::string>() : "";
+}
+
 void count_missed(RecordingInfo& info, const recording::McapChannel& channel,
                   const recording::McapMessage& message) {
   const auto record = record_of(evidence::RecordKind::kMissed, channel, message);
@@ -66,18 +73,23 @@ void count_missed(RecordingInfo& info, const recording::McapChannel& channel,
   };
   info.missed_events += number("events");
   info.missed_samples += number("samples");
+  const std::string source = text_of(record, "source");
+  const std::string why = text_of(record, "why");
+  if (why != "refused" && why != "stranger") return;
+  const std::string text = text_of(record, "text");
+  const auto known = info.unrecorded.find(source);
+  if (known != info.unrecorded.end()) {
+    if (text.size() <= known->second.text.size()) known->second = {why, text};
+  } else if (has_room(info, info.unrecorded.size(), source.size() + text.size())) {
+    info.unrecorded[source] = {why, text};
+  }
 }
 
 void note_import(RecordingInfo& info, const recording::McapChannel& channel,
                  const recording::McapMessage& message) {
   const auto record = record_of(evidence::RecordKind::kPort, channel, message);
-  const auto text = [&record](const char* name) -> std::string {
-    if (!record.is_object()) return {};
-    const auto found = record.find(name);
-    return found != record.end() && found->is_string() ? found->get<std::string>() : "";
-  };
-  const std::string source = text("port");
-  const std::string host = text("host");
+  const std::string source = text_of(record, "port");
+  const std::string host = text_of(record, "host");
   const auto known = info.imports.find(source);
   if (host.empty() || (known != info.imports.end() && known->second.contains(host))) return;
   if (has_room(info, info.imported, source.size() + host.size())) {
@@ -204,6 +216,10 @@ nlohmann::json to_json(const RecordingInfo& info) {
   for (const auto& [source, hosts] : info.imports) {
     imports.push_back({{"source", source}, {"hosts", hosts}});
   }
+  json unrecorded = json::array();
+  for (const auto& [source, each] : info.unrecorded) {
+    unrecorded.push_back({{"source", source}, {"why", each.why}, {"text", each.text}});
+  }
   json attachments = json::array();
   for (const auto& each : info.attachments) {
     attachments.push_back({{"name", each.name},
@@ -229,6 +245,7 @@ nlohmann::json to_json(const RecordingInfo& info) {
           {"schemas", std::move(schemas)},
           {"channels", std::move(channels)},
           {"imports", std::move(imports)},
+          {"unrecorded", std::move(unrecorded)},
           {"metadata", std::move(metadata)},
           {"attachments", std::move(attachments)},
           {"unlisted", info.unlisted}};

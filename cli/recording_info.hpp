@@ -37,6 +37,10 @@ struct RecordingInfo {
     std::uint64_t compressed = 0;
     std::uint64_t uncompressed = 0;
   };
+  struct Unrecorded {
+    std::string why;
+    std::string text;
+  };
   struct Attachment {
     std::string name;
     std::string media_type;
@@ -60,7 +64,10 @@ struct RecordingInfo {
   std::vector<Attachment> attachments;
   std::map<std::string, std::set<std::string>> imports;  // sources, and from which hosts they came
   std::size_t imported = 0;                              // of these, each with one host
-  std::uint64_t unlisted = 0;  // imports, metadata and attachments for which there was no room
+  // Sources that were not recorded, or not from the beginning, and why: "refused", "stranger".
+  std::map<std::string, Unrecorded> unrecorded;
+  // What of all these, of metadata and attachments had no room.
+  std::uint64_t unlisted = 0;
   std::size_t listed_bytes = 0;
 };
 

@@ -165,6 +165,13 @@ void write_imported_sources(std::ostream& out, const RecordingInfo& info) {
   }
 }
 
+void write_unrecorded_sources(std::ostream& out, const RecordingInfo& info) {
+  if (!info.unrecorded.empty()) out << "\nsources that were not recorded, at least for a while\n";
+  for (const auto& [source, each] : info.unrecorded) {
+    out << "  " << shm::printable(source + ": " + each.text) << '\n';
+  }
+}
+
 void write_metadata(std::ostream& out, const RecordingInfo& info) {
   for (const auto& [name, values] : info.metadata) {
     out << "\nmetadata " << shortened(name, kColumns - 9) << '\n';
@@ -184,7 +191,7 @@ void write_attachments(std::ostream& out, const RecordingInfo& info) {
   }
   if (info.unlisted > 0) {
     out << "\nand " << info.unlisted
-        << " more attachments, metadata records and sources of other hosts\n";
+        << " more attachments, metadata records and sources of other hosts or not recorded\n";
   }
 }
 
@@ -219,6 +226,7 @@ void write_text(std::ostream& out, const RecordingInfo& info) {
   write_chunks(out, info);
   write_channels(out, info);
   write_imported_sources(out, info);
+  write_unrecorded_sources(out, info);
   write_metadata(out, info);
   write_attachments(out, info);
   if (info.end.is_whole || !info.has_header) return;

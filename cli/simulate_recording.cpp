@@ -65,6 +65,12 @@ void write_head(const Recorded& recorded) {
             << rules::counted(arrivals_of(recorded), "arrival") << '\n';
   const std::string missed = evidence::missed_text(recorded);
   if (!missed.empty()) std::cout << "the recorder missed " << missed << '\n';
+  std::uint64_t left_out = 0;
+  for (const auto& run : recorded.runs) left_out += run.left_out;
+  if (left_out != 0) {
+    std::cout << rules::counted(left_out, "arrival") << (left_out == 1 ? " is" : " are")
+              << " left out: another daemon had come, and the recorder did not know it yet\n";
+  }
 }
 
 ordered_json to_json(const Recorded& recorded, const evidence::LiveDecision& live) {

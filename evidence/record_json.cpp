@@ -1,6 +1,7 @@
 #include "evidence/record_json.hpp"
 
 #include <charconv>
+#include <optional>
 
 #include <nlohmann/json.hpp>
 
@@ -57,10 +58,18 @@ class Fields {
   // One of the names that name_of() gives.
   template <class Word>
   [[nodiscard]] Word word(const char* name, std::initializer_list<Word> words) const {
+    const auto known = known_word(name, words);
+    if (!known) fail(name, "is none of the words that it may be");
+    return *known;
+  }
+  // The same, where a later version may have more of them; nothing: it is none of these.
+  template <class Word>
+  [[nodiscard]] std::optional<Word> known_word(const char* name,
+                                               std::initializer_list<Word> words) const {
     for (const Word each : words) {
       if (name_of(each) == text(name)) return each;
     }
-    fail(name, "is none of the words that it may be");
+    return std::nullopt;
   }
   [[nodiscard]] ActivityWord activity() const {
     const auto word = activity_of(text("activity"), time_of_activity());
@@ -221,7 +230,9 @@ Record read_missed(const Fields& in) {
   each.to = in.time("to_ns");
   each.events = in.number("events");
   each.samples = in.number("samples");
-  each.why = in.word<Why>("why", {Why::overtaken, Why::queue, Why::refused});
+  each.why = in.known_word<Why>("why", {Why::overtaken, Why::queue, Why::refused, Why::stranger,
+                                        Why::too_large, Why::memory})
+                 .value_or(Why::other);
   each.text = in.text("text");
   return each;
 }

@@ -61,8 +61,8 @@ const std::array<RecordSchema, kRecordKinds> record_schemas{{
      "port:text winner:text before:text time_ns:int "
      "why:start|arrival|expiry|deactivation|model|state by:text generation:int"},
     {"arbiter/missed", "arbiter.Missed",
-     "source:text from_ns:int to_ns:int events:int samples:int why:overtaken|queue|refused "
-     "text:text"},
+     "source:text from_ns:int to_ns:int events:int samples:int "
+     "why:overtaken|queue|refused|stranger|too_large|memory|other text:text"},
 }};
 
 std::string RecordSchema::json() const {

@@ -43,8 +43,8 @@ class Loader {
   static void leave_out_strangers(Run& run, const Run& next) {
     if (next.models.empty()) return;
     const Nanoseconds begun = next.models.begin()->second.time;
-    run.lost += std::erase_if(run.decisions,
-                              [&](const Decision& each) { return each.arrival().time >= begun; });
+    run.left_out += std::erase_if(
+        run.decisions, [&](const Decision& each) { return each.arrival().time >= begun; });
   }
 
   // Each takes effect after the one before.

@@ -56,6 +56,7 @@ struct Run {
   // Of output ports, by name, as they were recorded.
   std::map<std::string, std::vector<PortChange>> output_changes;
   std::uint64_t lost = 0;          // events
+  std::uint64_t left_out = 0;      // arrivals of another memory, that of the next run
   std::uint64_t lost_samples = 0;  // whose arrival is there, but not what was in them
 };
 

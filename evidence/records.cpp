@@ -39,14 +39,17 @@ const SourceContext* context_of(const Record& record) {
 
 std::size_t size_of(const Record& record) {
   constexpr std::size_t kControl = 32;  // of the pointer to it, and its place in a list
-  std::size_t size = sizeof(Record) + kControl;
-  if (const auto* arrival = std::get_if<Arrival>(&record); arrival != nullptr && arrival->payload) {
-    size += arrival->payload->capacity();
-  } else if (const auto* model = std::get_if<ModelChange>(&record)) {
+  std::size_t size = sizeof(Record) + kControl + payload_size_of(record);
+  if (const auto* model = std::get_if<ModelChange>(&record)) {
     for (const ModelFile& file : model->files) size += file.text.size();
     if (model->application) size += model->application->text.size();
   }
   return size;
+}
+
+std::size_t payload_size_of(const Record& record) {
+  const auto* arrival = std::get_if<Arrival>(&record);
+  return arrival == nullptr || !arrival->payload ? 0 : arrival->payload->capacity();
 }
 
 std::string_view name_of(SourceState::Why why) {
@@ -101,6 +104,14 @@ std::string_view name_of(Missed::Why why) {
       return "queue";
     case Missed::Why::refused:
       return "refused";
+    case Missed::Why::stranger:
+      return "stranger";
+    case Missed::Why::too_large:
+      return "too_large";
+    case Missed::Why::memory:
+      return "memory";
+    case Missed::Why::other:
+      return "other";
     case Missed::Why::overtaken:
       break;
   }

@@ -141,6 +141,10 @@ struct Missed {
     overtaken,  // the recorder read too slowly
     queue,      // it could not write as fast as it read
     refused,    // the source cannot be tapped: `text` says why
+    stranger,   // its component is one that the daemon does not know: `text` says which
+    too_large,  // no reader would be ready for so much
+    memory,     // there was no room for it in a flight recorder's memory
+    other,      // of a later version
   };
   std::string source;
   Nanoseconds from = 0;
@@ -161,6 +165,8 @@ using RecordPtr = std::shared_ptr<const Record>;
 [[nodiscard]] const SourceContext* context_of(const Record& record);
 // Bytes that it takes up in memory, roughly.
 [[nodiscard]] std::size_t size_of(const Record& record);
+// Those of its payload alone.
+[[nodiscard]] std::size_t payload_size_of(const Record& record);
 
 [[nodiscard]] std::string_view name_of(SourceState::Why why);
 [[nodiscard]] std::string_view name_of(PortChange::What what);

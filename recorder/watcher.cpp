@@ -22,8 +22,10 @@ constexpr std::chrono::milliseconds kLookAtPagesEvery{10};
 // otherwise, for input ports that no tap tells of.
 constexpr Nanoseconds kPortsAtMostEvery = 200'000'000;
 constexpr Nanoseconds kPortsAtLeastEvery = 2'000'000'000;
-// A source that could not be tapped is tried again: there may be room now, or a daemon.
+// A source that could not be tapped is tried again, less and less often: there may be room now, or
+// a daemon.
 constexpr Nanoseconds kTryAgainAfter = 1'000'000'000;
+constexpr Nanoseconds kTryAgainAtLeastEvery = 32'000'000'000;
 // A model that is replaced while it is asked for is asked for again.
 constexpr int kTries = 100;
 
@@ -113,7 +115,10 @@ void Watcher::begin() {
   node_.reset();
   node_.emplace(options_.caller.name, options_.node);
   sources_.clear();
-  ports_ = OpenPorts(shm::monotonic_now());
+  strangers_.clear();
+  pages_of_newcomers_ = pages_of_ids_ = 0;
+  begun_ = shm::monotonic_now();
+  ports_ = OpenPorts(begun_);
   refusals_.clear();
   instance_->catch_up();
   const auto model = watch::ModelInForce::fetch(*instance_);
@@ -245,7 +250,8 @@ void Watcher::open_tap(const std::string& source, Batch& batch) {
     opened_.push_back(watched.tap);
   } catch (const Error& error) {
     const bool is_known = watched.next_try != 0;
-    watched.next_try = shm::monotonic_now() + kTryAgainAfter;
+    watched.pause = std::clamp(2 * watched.pause, kTryAgainAfter, kTryAgainAtLeastEvery);
+    watched.next_try = shm::monotonic_now() + watched.pause;
     if (is_known) return;
     watched.seen = watched.reported = page_word(source);
     refusals_.emplace_back(source, error.what());
@@ -300,21 +306,27 @@ void Watcher::try_refused() {
   hand_over_taps(false);
 }
 
-// Sources that no model knew when watching began.
+// Sources that no model knew when watching began. Each has brought a page.
 void Watcher::look_for_newcomers() {
+  const std::uint64_t pages = memory_->pages().changes();
+  if (pages == pages_of_newcomers_) return;
   std::set<std::string> all;
   for (shm::SourceId id = 0; id < shm::kMaxSources; ++id) {
     if (memory_->pages().knows(id)) all.insert(memory_->source_name(id));
   }
   Batch batch;
   tap_newcomers(all, batch);
+  pages_of_newcomers_ = pages;
   if (batch.records.empty()) return;
   queue_.push(std::move(batch));
   hand_over_taps(false);
 }
 
 ActivityWord Watcher::page_word(const std::string& source) const {
-  const auto id = instance_->find_source(source);
+  return page_word(instance_->find_source(source));
+}
+
+ActivityWord Watcher::page_word(std::optional<shm::SourceId> id) const {
   const shm::Activity* activity = id ? memory_->pages().find(*id) : nullptr;
   return activity == nullptr ? shm::kNeverActive : shm::SeenActivity::of(*activity).word;
 }
@@ -331,15 +343,24 @@ void Watcher::add_page_state(const std::string& source, ActivityWord word, Batch
   batch.add(std::move(state));
 }
 
+// An id becomes another source's with a page of its own.
+void Watcher::find_ids() {
+  const std::uint64_t pages = memory_->pages().changes();
+  if (pages == pages_of_ids_) return;
+  for (auto& [source, watched] : sources_) watched.id = instance_->find_source(source);
+  pages_of_ids_ = pages;
+}
+
 // What nobody tells: an operator deactivates a source whose port is closed; a publisher dies
 // between its arrival and telling of it. Where somebody tells, it may be that the tap was not
 // polled since; so the page is believed once a whole poll has told nothing.
 void Watcher::look_at_pages() {
   if (memory_ == nullptr) return;  // another daemon has come, and was busy
+  find_ids();
   Batch batch;
   for (auto& [source, watched] : sources_) {
     const TapReader* const tap = watched.tap.get();
-    const ActivityWord word = page_word(source);
+    const ActivityWord word = page_word(watched.id);
     const auto polled = tap == nullptr ? TapReader::Polled{} : tap->polled();
     if (polled.is_live || word != watched.seen) watched.polls = polled.polls;
     watched.seen = word;
@@ -367,8 +388,30 @@ void Watcher::look_at_ports() {
     const wire::Status status = instance_->status();
     Batch batch;
     ports_.note(status, shm::monotonic_now(), batch);
+    note_strangers(status.strangers, batch);
     if (!batch.records.empty()) queue_.push(std::move(batch));
   } catch (const wire::RefusedError&) {  // the policy does not let this user ask
+  }
+}
+
+// They go on by the memory of a daemon before, where nothing of this run is: who obeys them does,
+// and no tap of this memory tells of it.
+void Watcher::note_strangers(const std::vector<wire::StrangerStatus>& strangers, Batch& batch) {
+  for (const wire::StrangerStatus& stranger : strangers) {
+    const std::string component = stranger.node + " (pid " + std::to_string(stranger.pid) + ")";
+    std::vector<std::string> unrecorded;
+    for (const std::string& source : stranger.outputs) {
+      const bool is_recorded = options_.ports.empty() || sources_.count(source) != 0;
+      if (!is_recorded || !strangers_.insert({source, stranger.pid}).second) continue;
+      unrecorded.push_back(source);
+      batch.add(evidence::Missed{
+          source, begun_, shm::monotonic_now(), 0, 0, evidence::Missed::Why::stranger,
+          "of component " + component + ", which this daemon does not know"});
+    }
+    if (unrecorded.empty()) continue;
+    options_.say("cannot record " + rules::enumerate(unrecorded) + " of component " + component +
+                 ": it goes on by the memory of a daemon before, and this one does not know it; "
+                 "start it again");
   }
 }
 

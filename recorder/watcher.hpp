@@ -74,8 +74,11 @@ class Watcher {
   void hand_over_taps(bool is_start);
   void add_page_state(const std::string& source, evidence::ActivityWord word, Batch& batch) const;
   [[nodiscard]] evidence::ActivityWord page_word(const std::string& source) const;
+  [[nodiscard]] evidence::ActivityWord page_word(std::optional<shm::SourceId> id) const;
+  void find_ids();
   void try_refused();
   void look_at_ports();
+  void note_strangers(const std::vector<wire::StrangerStatus>& strangers, Batch& batch);
 
   const RecorderOptions& options_;
   RecordQueue& queue_;
@@ -87,12 +90,21 @@ class Watcher {
   struct Watched {
     std::shared_ptr<TapReader> tap;  // null: it cannot be tapped, and is tried again
     Nanoseconds next_try = 0;
+    Nanoseconds pause = 0;            // before that try
+    std::optional<shm::SourceId> id;  // as find_ids() has found it
     // Of the page: what it said last, and what was put into the queue.
     evidence::ActivityWord seen = shm::kNeverActive;
     evidence::ActivityWord reported = shm::kNeverActive;
     std::uint64_t polls = 0;  // of the tap, when that was seen first
   };
   std::map<std::string, Watched> sources_;
+  // ActivityPages::changes() when newcomers were looked for, and when ids were. It is never 0 once
+  // there is a source.
+  std::uint64_t pages_of_newcomers_ = 0;
+  std::uint64_t pages_of_ids_ = 0;
+  Nanoseconds begun_ = 0;
+  // Output ports and their processes, of components that the daemon does not know.
+  std::set<std::pair<std::string, std::int32_t>> strangers_;
   OpenPorts ports_{0};
   Nanoseconds last_ports_ = 0;
   std::vector<std::shared_ptr<TapReader>> opened_;  // and not handed over yet

@@ -249,10 +249,35 @@ TEST_F(RecordingVerb, SaysFromWhichHostsSourcesCame) {
   EXPECT_THAT(arbiter({"recording", "info", whole_}).out, Not(HasSubstr("other hosts")));
 }
 
+// As a recorder notes them, and some that it would not.
+std::string with_unrecorded(const TemporaryDirectory& directory) {
+  std::string path = directory.file("unrecorded.mcap");
+  recording::McapWriter writer(path, "arbiter test", {});
+  const auto missed = writer.add_channel({0, "arbiter/missed", "json", {}});
+  for (const std::string text :
+       {R"({"source": "/b:o", "why": "refused", "text": "no\u001b"})",
+        R"({"source": "/a:o", "why": "stranger", "text": "of component nav, pid 7"})",
+        R"({"source": "/c:o", "why": "queue", "text": ""})", R"({"source": 5, "why": 6})", "["}) {
+    writer.write({missed, 0, kNoon, kNoon, std::as_bytes(std::span(text))});
+  }
+  writer.close();
+  return path;
+}
+
+TEST_F(RecordingVerb, SaysWhichSourcesWereNotRecorded) {
+  const auto result = arbiter({"recording", "info", with_unrecorded(directory_)});
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.out, HasSubstr("\nsources that were not recorded, at least for a while\n"
+                                    "  /a:o: of component nav, pid 7\n  /b:o: no\\x1b\n"));
+  EXPECT_THAT(result.out, Not(HasSubstr("/c:o")));
+  EXPECT_THAT(arbiter({"recording", "info", whole_}).out, Not(HasSubstr("not recorded")));
+}
+
 // In both directions.
 TEST_F(RecordingVerb, WritesTheDocumentThatThePageDescribes) {
   ObservedFields observed({"metadata[].values", "channels[].metadata"});
-  for (const std::string& path : {whole_, cut(), with_imports(directory_)}) {
+  for (const std::string& path :
+       {whole_, cut(), with_imports(directory_), with_unrecorded(directory_)}) {
     observed.see(json::parse(arbiter({"recording", "info", "--json", path}).out));
   }
   const std::string empty = directory_.file("empty.mcap");
