@@ -125,6 +125,8 @@ void Daemon::handle(Client& client, wire::Received& received) {
       connect(client, message.request, message.port);
       break;
     case wire::MessageKind::kNodeEnded:
+      // Its own: nothing is kept for it, not even what it asked for and did not wait for.
+      if (message.link == client.node) client.comes_back = false;
       takeover_.forget_ended(client, message.link);
       break;
     case wire::MessageKind::kStop:

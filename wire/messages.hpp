@@ -17,8 +17,8 @@
 //
 // A client that has lost its daemon looks for another, or the same, and says kHello with kRejoins;
 // it is answered kWelcome (or kRefused) and tells what it has: kHandBackPage…, for each port
-// kHandBackOutput or kHandBackInput with its kHandBackLink…, and then kHandedBack. Of nodes that
-// end while there is no daemon the other nodes of their process tell the next one: kNodeEnded.
+// kHandBackOutput or kHandBackInput with its kHandBackLink…, and then kHandedBack. A node that ends
+// says kNodeEnded; where no daemon reads it the other nodes of its process tell the next one.
 #pragma once
 
 #include <sys/types.h>
@@ -73,7 +73,7 @@ enum class MessageKind : std::uint32_t {
   kDescribe,   // port, text: what stands behind it, for the status; empty: nothing
   kMay = 60,   // value: a user; text: its groups, numbers between blanks; name: an action that is
                // about no port. kDone: the policy allows it; kRefused, text: why not
-  kNodeEnded,  // link: a node of this process that has ended, perhaps without being heard
+  kNodeEnded,  // link: the node itself, or one of its process that may have ended unheard
 
   // From the daemon.
   kWelcome = 100,  // link: the node's number; peer: the daemon's clock, 0 if it does not say;

@@ -74,8 +74,7 @@ NodeCore::NodeCore(std::string_view name, const NodeOptions& options)
 
 NodeCore::~NodeCore() {
   stop_service_thread();
-  say_the_rest();
-  remember_end();
+  say_the_end();
   hang_up();
 }
 
@@ -105,6 +104,7 @@ void NodeCore::connect() {
       epoll_ctl(epoll_.get(), EPOLL_CTL_ADD, timer_.get(), &event) != 0 || !watch_socket()) {
     throw Error(std::string("no descriptor for the daemon's messages: ") + std::strerror(errno));
   }
+  ring_for_ended(service_bell_);
   note_second_daemons(welcome.directory);
 }
 
@@ -210,6 +210,10 @@ bool NodeCore::wait_for_news(std::unique_lock<std::mutex>& lock, Clock::time_poi
 // Nobody waits for the answer any more.
 void NodeCore::give_up_on(std::uint64_t request) {
   const auto unanswered = replies_.extract(request);
+  if (unanswered.mapped().asked_in == conversation_ && socket_ != nullptr) {
+    if (!outbox_.withdraw(request)) given_up_.insert(request);
+    if (outbox_.empty()) heed_room(false);
+  }
   if (unanswered.mapped().opened != 0) forget_port(unanswered.mapped().opened);
 }
 
@@ -251,6 +255,7 @@ wire::Received NodeCore::converse(const wire::Message& question,
     }
     if (standing_ == Standing::kMember && reply.asked_in != conversation_) {
       reply.asked_in = conversation_;
+      reply.is_behind_given_up = !given_up_.empty();
       say_who_has_ended();  // before a name is asked for that is kept for one of them
       // A port that another daemon has opened was handed back to this one: what is left is to be
       // connected.

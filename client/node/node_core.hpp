@@ -86,6 +86,7 @@ class NodeCore : public std::enable_shared_from_this<NodeCore> {
     shm::PortInstance opened = 0;  // kOpened came
     bool finished = false;
     std::uint64_t asked_in = 0;  // the conversation in which the question was asked last
+    bool is_behind_given_up = false;
     std::string refusal;
     wire::Received received;
     std::function<void(wire::Received&)> on_opened;
@@ -184,16 +185,17 @@ class NodeCore : public std::enable_shared_from_this<NodeCore> {
   void be_turned_away(const wire::Message& refusal);
   // Whether the daemon is there, and has read all that we have said.
   [[nodiscard]] bool is_heard() const noexcept;
-  void remember_end() const noexcept;
-  // Under mutex_, as a member: of the nodes of this process.
+  // Under mutex_: which nodes of this process have ended.
   void say_who_has_ended() noexcept;
+  void say_ended(std::uint64_t node) noexcept;
 
   [[nodiscard]] Socket socket();
   // Under mutex_. Never waits for the daemon. What is lost with the conversation, rejoining makes
   // good; it is over after this where that is the only way on.
   void say(const wire::Message& message, Outbox::Descriptors descriptors = {-1, -1}) noexcept;
   void say_what_waits() noexcept;
-  void say_the_rest() noexcept;
+  // The last that it says, under no lock: there is no other thread.
+  void say_the_end() noexcept;
   // Whether the loop is to hear of room in the socket, too.
   void heed_room(bool is_wanted) const noexcept;
   void say_closed(shm::PortInstance port) noexcept;
@@ -225,6 +227,9 @@ class NodeCore : public std::enable_shared_from_this<NodeCore> {
   std::mutex pump_mutex_;         // without a service thread: one caller at a time
   Socket socket_;                 // null while alone
   Outbox outbox_;                 // of the conversation
+  std::set<std::uint64_t> ended_said_;  // nodes of this process, and perhaps not heard yet
+  std::uint64_t ended_said_in_ = 0;     // the conversation
+  bool has_ended_to_tell_ = false;
   Standing standing_ = Standing::kMember;
   std::uint64_t conversation_ = 1;  // counts the daemons that have welcomed us
   std::uint64_t node_ = 0;          // our number among all nodes
@@ -235,6 +240,8 @@ class NodeCore : public std::enable_shared_from_this<NodeCore> {
   bool stopping_ = false;
   std::uint64_t next_request_ = 1;
   std::map<std::uint64_t, Reply> replies_;
+  // What the daemon will answer first, and nobody waits for.
+  std::set<std::uint64_t> given_up_;
   std::map<shm::PortInstance, std::shared_ptr<OutputCore>> outputs_;
   std::map<shm::PortInstance, std::shared_ptr<InputCore>> inputs_;
   std::map<shm::PortInstance, std::shared_ptr<TapCore>> taps_;

@@ -41,6 +41,14 @@ bool Outbox::keep(const wire::Message& message, Descriptors descriptors) noexcep
   return false;
 }
 
+// A daemon's own number is in the answer to it.
+bool Outbox::withdraw(std::uint64_t request) noexcept {
+  return std::erase_if(waiting_, [&](const Waiting& each) {
+           return each.message.request == request &&
+                  each.message.kind != wire::MessageKind::kSynced;
+         }) != 0;
+}
+
 bool Outbox::flush(int socket) noexcept {
   while (!waiting_.empty()) {
     const Waiting& next = waiting_.front();

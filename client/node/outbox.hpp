@@ -6,6 +6,7 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <deque>
 
 #include "shm/file_descriptor.hpp"
@@ -25,6 +26,9 @@ class Outbox {
                           Descriptors descriptors = {-1, -1}) noexcept;
   // What there is room for by now. As send().
   [[nodiscard]] bool flush(int socket) noexcept;
+
+  // Nobody waits for the answer any more. False: it has been sent.
+  bool withdraw(std::uint64_t request) noexcept;
 
   [[nodiscard]] bool empty() const noexcept { return waiting_.empty(); }
   // With the conversation.

@@ -37,6 +37,8 @@ namespace {
 constexpr std::chrono::milliseconds kRejoinInterval{50};
 // How long until it is tried again with a daemon that does not want us.
 constexpr std::chrono::milliseconds kTurnedAwayInterval{1000};
+// Of nodes that have ended: the others are said once these have been heard.
+constexpr std::size_t kMostEndedAtOnce = 256;
 
 bool is_sent(const shm::FileDescriptor& socket, const wire::Message& message,
              std::array<int, wire::kMaxDescriptors> descriptors = {-1, -1}) {
@@ -100,6 +102,7 @@ void NodeCore::be_alone(Clock::duration look_again_in) noexcept {
   hang_up();
   socket_ = nullptr;
   outbox_.clear();
+  given_up_.clear();
   standing_ = Standing::kAlone;
   ring_timer_every(look_again_in);
   news_.notify_all();
@@ -225,29 +228,25 @@ bool NodeCore::is_heard() const noexcept {
   return !has_hung_up(*socket_) && ::ioctl(socket_->get(), SIOCOUTQ, &unread) == 0 && unread == 0;
 }
 
-void NodeCore::remember_end() const noexcept {
-  if (node_ == 0 || is_heard()) return;
-  try {
-    remember_ended(shm::identity_of(memory_->board()), node_);
-  } catch (const std::exception&) {  // its memory is there
-  }
-}
-
 void NodeCore::say_who_has_ended() noexcept {
+  has_ended_to_tell_ = false;
+  if (standing_ != Standing::kMember || socket_ == nullptr || !has_any_ended()) return;
   try {
     const auto board = shm::identity_of(memory_->board());
-    while (const std::uint64_t ended = take_ended(board)) {
-      wire::Message message;
-      message.kind = wire::MessageKind::kNodeEnded;
-      message.link = ended;
-      say(message);
-      // What waits in the outbox may be lost with the conversation: it is said again, then.
-      if (socket_ == nullptr || !outbox_.empty() || has_hung_up(*socket_)) {
-        remember_ended(board, ended);
-        return;
-      }
+    if (ended_said_in_ != conversation_) ended_said_.clear();
+    ended_said_in_ = conversation_;
+    if (!ended_said_.empty() && is_heard()) {
+      forget_ended(board, ended_said_);
+      ended_said_.clear();
     }
-  } catch (const std::exception&) {
+    const auto ended = ended_in(board);
+    for (const std::uint64_t node : ended) {
+      // To the next daemon all are said again.
+      if (socket_ == nullptr || ended_said_.size() == kMostEndedAtOnce) break;
+      if (ended_said_.insert(node).second) say_ended(node);
+    }
+    has_ended_to_tell_ = !ended.empty();
+  } catch (const std::exception&) {  // no memory: another time
   }
 }
 

@@ -81,6 +81,7 @@ void NodeCore::run_service_thread() {
 int NodeCore::look_again_in() {
   const std::lock_guard lock(mutex_);
   const bool has_to_tidy =
+      has_ended_to_tell_ ||
       std::any_of(inputs_.begin(), inputs_.end(),
                   [](const auto& input) { return input.second->has_predecessors(); }) ||
       std::any_of(outputs_.begin(), outputs_.end(),
@@ -112,6 +113,7 @@ void NodeCore::pump(int timeout_ms) {
   {
     const std::lock_guard lock(mutex_);
     say_what_waits();
+    say_who_has_ended();
     say_descriptions();
   }
   const Socket socket = this->socket();
@@ -332,6 +334,7 @@ void NodeCore::handle_reply(wire::Received& received) {
   const auto found = replies_.find(message.request);
   if (found == replies_.end()) {
     // Nobody waits for it any more.
+    given_up_.erase(message.request);
     if (message.kind == wire::MessageKind::kOpened) say_closed(message.port);
     return;
   }
@@ -346,7 +349,15 @@ void NodeCore::handle_reply(wire::Received& received) {
     }
     return;
   }
-  if (message.kind == wire::MessageKind::kRefused) reply.refusal = message.text_view();
+  if (message.kind == wire::MessageKind::kRefused) {
+    // Perhaps for a port of ours that an opening before it has got and is to be closed.
+    if (reply.is_behind_given_up) {
+      reply.asked_in = 0;
+      news_.notify_all();
+      return;
+    }
+    reply.refusal = message.text_view();
+  }
   reply.received = std::move(received);
   reply.finished = true;
   news_.notify_all();

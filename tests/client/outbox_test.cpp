@@ -1,9 +1,11 @@
 // What a node says to a daemon that does not read: it holds up nobody, and nothing of it is lost.
 #include "client/node/outbox.hpp"
 
+#include <fcntl.h>
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 #include <sys/socket.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <optional>
@@ -81,6 +83,26 @@ TEST_F(OutboxOfASocket, EndsTheConversationWhereTooMuchWaits) {
   std::uint64_t said = 0;
   while (outbox_.send(node_.get(), numbered(++said))) ASSERT_LT(said, 100'000u);
   EXPECT_GT(said, 4096u);
+}
+
+// With its descriptors: who asks again and again would have none left.
+TEST_F(OutboxOfASocket, WithdrawsWhatNobodyWaitsFor) {
+  std::uint64_t said = 0;
+  while (outbox_.empty()) ASSERT_TRUE(outbox_.send(node_.get(), numbered(++said)));
+  EXPECT_FALSE(outbox_.withdraw(1)) << "it is in the socket";
+  int ends[2] = {-1, -1};
+  ASSERT_EQ(::pipe2(ends, O_CLOEXEC), 0);
+  const shm::FileDescriptor reads(ends[0]);
+  shm::FileDescriptor writes(ends[1]);
+  ASSERT_TRUE(outbox_.send(node_.get(), numbered(said + 1), {writes.get(), -1}));
+  writes.reset();
+  EXPECT_TRUE(outbox_.withdraw(said + 1));
+  char nothing = 0;
+  EXPECT_EQ(::read(reads.get(), &nothing, 1), 0) << "no copy of it is left";
+  hear_all();
+  ASSERT_TRUE(outbox_.flush(node_.get()));
+  hear_all();
+  EXPECT_EQ(heard_, said);
 }
 
 TEST_F(OutboxOfASocket, ForgetsWhatNobodyWillRead) {

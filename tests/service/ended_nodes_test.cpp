@@ -1,7 +1,11 @@
 // A daemon takes over when a component has no port left, or has ended while there was no daemon.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <chrono>
 #include <optional>
+#include <string>
+#include <vector>
 
 #include <arbiter/arbiter.hpp>
 
@@ -103,6 +107,107 @@ TEST(Takeover, OfANodeThatEndsBeforeAStoppedDaemonThePortsAreFreedToo) {
   auto out = node.output_port<Number>("/out");
   EXPECT_EQ(out.publish(Number{1}).delivered, 1u);
   EXPECT_EQ(take_from(in), 1);
+}
+
+bool keeps_any(Daemon& daemon) {
+  const auto status = daemon.status();
+  return std::any_of(status["sources"].begin(), status["sources"].end(),
+                     [](const auto& each) { return each["away"] == true; });
+}
+
+NodeOptions without_thread() {
+  NodeOptions options;
+  options.service_thread = false;
+  options.connect_timeout = std::chrono::milliseconds(0);
+  options.on_waiting = [](const std::string&) {};
+  return options;
+}
+
+// A daemon that hangs until its watchdog kills it has read nothing of it.
+TEST(Takeover, ThatANodeHasEndedIsSaidUntilADaemonHasReadIt) {
+  Daemon daemon(single_model());
+  Node node("test", without_thread());
+  auto in = node.input_port<Number>("/in");
+  {
+    Node ended("ended");
+    auto out = ended.output_port<Number>("/out");
+    daemon.process().stop();
+  }
+  node.service();  // it is in the socket now
+  daemon.kill();
+  daemon.restart();
+  await([&] {
+    node.service();
+    return !keeps_any(daemon);
+  });
+  Component other("other");
+  EXPECT_EQ(other.tell("output /out"), "open");
+}
+
+TEST(Takeover, OfMoreNodesThanAnyoneCountsAllPortsAreFreed) {
+  Daemon daemon(single_model());
+  Node node("test");
+  auto in = node.input_port<Number>("/in");
+  std::vector<Node> ended;
+  std::vector<OutputPort<Number>> ports;
+  for (int i = 0; i < 80; ++i) {
+    ended.emplace_back("ended", without_thread());
+    ports.push_back(ended.back().output_port<Number>("/" + std::to_string(i)));
+  }
+  daemon.kill();
+  ports.clear();
+  ended.clear();
+  daemon.restart();
+  await([&] { return !keeps_any(daemon); });
+}
+
+// Nobody else of its process says anything meanwhile.
+TEST(EndedNode, IsToldByAnIdleNodeOfItsProcess) {
+  Daemon daemon(single_model());
+  Node idle("idle");
+  auto in = idle.input_port<Number>("/in");
+  {
+    Node ended("ended", without_thread());
+    std::vector<OutputPort<void>> ports;
+    for (int i = 0; i < 300; ++i) ports.push_back(ended.output_port("/" + std::to_string(i)));
+    daemon.process().stop();
+  }
+  daemon.process().resume();
+  Component other("other");
+  for (int i = 0; i < 300; i += 13) {
+    EXPECT_EQ(other.tell("output /" + std::to_string(i)), "open") << i;
+  }
+}
+
+// It has given the opening up; the daemon has opened the port for it all the same.
+TEST(EndedNode, LeavesNothingOfAnOpeningThatItDidNotWaitFor) {
+  Daemon daemon(single_model());
+  {
+    Node ended("ended", without_thread());
+    daemon.process().stop();
+    EXPECT_THROW(static_cast<void>(ended.output_port<Number>("/out")), Error);
+    daemon.process().resume();
+    await([&] { return daemon.source("/out")["open"] == true; });
+  }
+  Component other("other");
+  EXPECT_EQ(other.tell("output /out"), "open");
+}
+
+// The daemon answers the first opening before the second, and gives the name to that.
+TEST(Opening, AgainAfterADaemonDidNotAnswerIsNotRefusedForTheFirst) {
+  Daemon daemon(single_model());
+  bool is_second = false;
+  NodeOptions options;
+  options.connect_timeout = std::chrono::milliseconds(0);
+  options.on_waiting = [&](const std::string&) {
+    if (is_second) daemon.process().resume();
+  };
+  Node node("test", options);
+  daemon.process().stop();
+  EXPECT_THROW(static_cast<void>(node.output_port<Number>("/out")), Error);
+  is_second = true;
+  auto out = node.output_port<Number>("/out");
+  EXPECT_EQ(out.publish(Number{1}).delivered, 0u);
 }
 
 }  // namespace
