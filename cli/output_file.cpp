@@ -28,7 +28,10 @@ void write_to(const std::string& path, const std::string& content) {
   }
 }
 
-bool is_standard_output(const std::string& path) { return path.empty() || path == "-"; }
+// By its own name, too: where a shell has led it to a file, that would look like one that is there.
+bool is_standard_output(const std::string& path) {
+  return path.empty() || path == "-" || path == "/dev/stdout";
+}
 
 // A terminal may well be read and written.
 bool is_one_regular_file(const std::string& path, const std::string& other) {
@@ -36,6 +39,19 @@ bool is_one_regular_file(const std::string& path, const std::string& other) {
   struct stat two {};
   return stat(path.c_str(), &one) == 0 && S_ISREG(one.st_mode) && stat(other.c_str(), &two) == 0 &&
          one.st_dev == two.st_dev && one.st_ino == two.st_ino;
+}
+
+// Where neither is there yet.
+bool will_be_one_file(const std::string& path, const std::string& other) {
+  namespace fs = std::filesystem;
+  std::error_code unknown;
+  if (fs::exists(path, unknown) || fs::exists(other, unknown)) return false;
+  // Of a relative name of which nothing is there, weakly_canonical() makes no absolute one.
+  const auto place_of = [&](const std::string& each) {
+    return fs::weakly_canonical(fs::absolute(each, unknown), unknown);
+  };
+  const fs::path place = place_of(path);
+  return !place.empty() && place == place_of(other);
 }
 
 }  // namespace
@@ -57,26 +73,28 @@ void require_no_input(const std::string& output, const rules::ModelTexts& inputs
 
 void require_two_files(const std::string& option, const std::string& output,
                        const std::string& other_option, const std::string& other) {
-  namespace fs = std::filesystem;
-  std::error_code unknown;
   const bool is_any_standard_output = is_standard_output(output) || is_standard_output(other);
-  // Neither need be there yet.
-  const bool is_one =
-      is_any_standard_output
-          ? is_standard_output(output) && is_standard_output(other)
-          : is_one_regular_file(output, other) ||
-                (!fs::exists(output, unknown) &&
-                 fs::weakly_canonical(output, unknown) == fs::weakly_canonical(other, unknown));
+  const bool is_one = is_any_standard_output
+                          ? is_standard_output(output) && is_standard_output(other)
+                          : is_one_regular_file(output, other) || will_be_one_file(output, other);
   if (!is_one) return;
   throw rules::FileError(option + ' ' + output + " and " + other_option + ' ' + other +
                          " are one file; nothing was written: give another file");
 }
 
-void require_new_file(const std::string& output, const std::string& how) {
+void add_force_option(CLI::App& verb, bool& replaces) {
+  verb.add_flag("--force", replaces, "Replace files that are there already");
+}
+
+void require_new_file(const std::string& output, bool replaces) {
   std::error_code unknown;
-  if (is_standard_output(output) || !std::filesystem::is_regular_file(output, unknown)) return;
-  throw rules::FileError(output + " is there already; nothing was written: give another file, or " +
-                         how);
+  if (replaces || is_standard_output(output) ||
+      !std::filesystem::is_regular_file(output, unknown)) {
+    return;
+  }
+  throw rules::FileError(output +
+                         " is there already; nothing was written: give another file, or --force to "
+                         "replace it");
 }
 
 void write_output(const std::string& path, const std::string& content) {

@@ -3,6 +3,8 @@
 
 #include <string>
 
+#include <CLI/CLI.hpp>
+
 #include "rules/model/model_texts.hpp"
 
 namespace arbiter::cli {
@@ -17,11 +19,13 @@ void require_no_input(const std::string& option, const std::string& output,
 void require_two_files(const std::string& option, const std::string& output,
                        const std::string& other_option, const std::string& other);
 
-// Throws rules::FileError where a file is there already, which somebody may have changed by hand;
-// `how` says how to write it all the same.
-void require_new_file(const std::string& output, const std::string& how);
+// --force, for verbs whose files somebody may have changed by hand or may have no second time.
+void add_force_option(CLI::App& verb, bool& replaces);
 
-// To standard output where `path` is empty or "-".
+// Throws rules::FileError where a file is there already, unless it may be replaced (--force).
+void require_new_file(const std::string& output, bool replaces);
+
+// To standard output where `path` is empty, "-" or "/dev/stdout".
 // Whoever reads a file sees the old content or the new one, never a part. What is no regular file
 // is written as it is. Throws rules::FileError.
 void write_output(const std::string& path, const std::string& content);

@@ -21,6 +21,7 @@ struct ExportOptions {
   std::string file;
   std::string trace;
   std::string csv;
+  bool replaces = false;
 };
 
 int export_recording(const ExportOptions& options) {
@@ -32,6 +33,8 @@ int export_recording(const ExportOptions& options) {
   if (!options.trace.empty() && !options.csv.empty()) {
     require_two_files("--trace", options.trace, "--csv", options.csv);
   }
+  require_new_file(options.trace, options.replaces);
+  require_new_file(options.csv, options.replaces);
   ProgressLine line;
   const auto recorded = evidence::load_recording(options.file, line.watch("reading the recording"));
   line.clear();
@@ -64,10 +67,12 @@ void add_export(CLI::App& parent, int& exit_code) {
   verb->add_option("--csv", options->csv,
                    "What was decided live, in the form that `arbiter simulate` prints")
       ->type_name("FILE");
+  add_force_option(*verb, options->replaces);
   verb->footer(
       "Example:\n  arbiter recording export incident.mcap --trace trace.csv --csv decisions.csv\n\n"
       "Exit codes: 0 written; 1 a file that `arbiter record` has not made, or a model of the "
-      "recording cannot\nbe loaded; 2 wrong use, or a file that cannot be opened or written");
+      "recording cannot\nbe loaded; 2 wrong use, or a file that cannot be opened or written, or is "
+      "there already");
   verb->callback([options, &exit_code] { exit_code = export_recording(*options); });
 }
 

@@ -37,6 +37,7 @@ struct SampleOptions {
   std::optional<std::uint64_t> sequence;
   std::string at;
   std::string output;
+  bool replaces = false;
 };
 
 // A sample of the source, in the file's order.
@@ -165,7 +166,8 @@ int write_sample(const SampleOptions& options) {
                                "a terminal cannot show bytes: write them to a file "
                                "(-o FILE), or to a program (| xxd)");
   }
-  if (!options.output.empty()) require_no_input("--output", options.output, options.file);
+  require_no_input("--output", options.output, options.file);
+  require_new_file(options.output, options.replaces);
   const Found found = look_for(options);
   require_samples(options, found);
   const std::size_t number = choose(options, found);
@@ -176,11 +178,7 @@ int write_sample(const SampleOptions& options) {
   const Arrival sample = read_sample(options, number);
   const std::string bytes(reinterpret_cast<const char*>(sample.payload->data()),
                           sample.payload->size());
-  if (options.output.empty()) {
-    std::cout << bytes;
-  } else {
-    write_output(options.output, bytes);
-  }
+  write_output(options.output, bytes);
   const std::string& type = sample.context->type;
   std::cerr << what << ": " << bytes.size() << (bytes.size() == 1 ? " byte" : " bytes") << ", "
             << (type.empty() ? "untyped" : shm::printable(type)) << '\n';
@@ -207,14 +205,14 @@ void add_recorded_sample(CLI::App& parent, int& exit_code) {
       ->excludes(sequence)
       ->type_name("TIME");
   verb->add_option("-o,--output", options->output, kOutputHelp)->type_name("FILE");
+  add_force_option(*verb, options->replaces);
   verb->footer(
       "Example:\n  arbiter recording sample incident.mcap --source /Nav/cmd_vel:o --at 14:03:07 | "
       "xxd\n\n"
       "The bytes are written as they were published, and nothing else; standard error says which "
       "sample\nit is, and its type.\n\n"
       "Exit codes: 0 written; 1 a file that `arbiter record` has not made; 2 wrong use, a file "
-      "that "
-      "cannot\nbe read or written, or a sample that is not in it");
+      "that cannot\nbe read or written or is there already, or a sample that is not in it");
   verb->callback([options, &exit_code] { exit_code = write_sample(*options); });
 }
 

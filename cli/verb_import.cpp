@@ -118,9 +118,8 @@ void require_other_files(const ImportVerbOptions& options) {
 
 // Whoever imports goes on by hand from what was written.
 void require_new_files(const ImportVerbOptions& options) {
-  if (options.replaces) return;
   for (const std::string& output : {options.output, options.mapping}) {
-    require_new_file(output, "--force to replace it");
+    require_new_file(output, options.replaces);
   }
 }
 
@@ -170,6 +169,15 @@ std::string problem_of_kind(std::string& kind) {
          rules::advise(kind, kinds, "name twist_mux or cmd_vel_mux");
 }
 
+CLI::Validator name_of_node() {
+  return {[](std::string& text) -> std::string {
+            const bool is_pattern = text.find('*') != std::string::npos;
+            return is_pattern ? '"' + text + "\" is not the name of one node, such as /robot/mux"
+                              : "";
+          },
+          ""};
+}
+
 // A value that would make a file that nobody can read.
 CLI::Validator name_of_topic(const char* what) {
   return {[what](std::string& text) -> std::string {
@@ -209,14 +217,14 @@ void add_outputs(CLI::App& verb, ImportVerbOptions& options) {
       ->type_name("DIRECTORY")
       ->excludes(output)
       ->excludes(mapping);
-  verb.add_flag("--force", options.replaces,
-                "Replace files that are there already, with what was changed in them by hand");
+  add_force_option(verb, options.replaces);
 }
 
 void add_names(CLI::App& verb, ImportVerbOptions& options) {
   verb.add_option("--node", options.import.node,
                   "The node to import, if the files have several, such as /robot/twist_mux")
-      ->type_name("NAME");
+      ->type_name("NAME")
+      ->check(name_of_node());
   verb.add_option("--namespace", options.import.name_space,
                   "What topics without a slash in front are relative to; without it, what the "
                   "files say, or /")

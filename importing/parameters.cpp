@@ -4,6 +4,7 @@
 #include <set>
 #include <utility>
 
+#include "importing/node_names.hpp"
 #include "rules/text/names.hpp"
 #include "rules/text/text_file.hpp"
 
@@ -19,9 +20,6 @@ std::string join(const std::string& path, std::string_view key) {
   return path + "/" + std::string(key);
 }
 
-// ROS 2 lets a file speak of nodes by a pattern: "/**", "/*/twist_mux".
-bool is_pattern(std::string_view node) { return node.find('*') != std::string_view::npos; }
-
 class Finder {
  public:
   Finder(const std::vector<std::string_view>& wanted, std::vector<ParameterSet>& found,
@@ -31,7 +29,9 @@ class Finder {
   void look_in(const YamlNode& map, const std::string& path) {
     if (const YamlEntry* parameters = map.find(kRosParameters)) {
       refuse_dots(parameters->value);
-      if (has_wanted(parameters->value)) found_.push_back({path, true, &parameters->value});
+      if (has_wanted(parameters->value) && !is_of_no_node(path, *parameters)) {
+        found_.push_back({path, true, &parameters->value});
+      }
     } else if (has_wanted(map)) {
       found_.push_back({path, false, &map});
       return;
@@ -57,6 +57,15 @@ class Finder {
                              first.append(": {NAME: {topic: …}}`"));
       return;  // one for all of them
     }
+  }
+
+  bool is_of_no_node(const std::string& path, const YamlEntry& parameters) {
+    if (is_good_pattern(path)) return false;
+    diagnostics_.warning("unknown-key", parameters.key.where,
+                         "ROS 2 takes `*` and `**` as whole words between slashes only, so that no "
+                         "node has the parameters of " +
+                             rules::quote(path) + "; write the words");
+    return true;
   }
 
   // Taken for a node, it would be a part of each topic's name.
@@ -92,20 +101,73 @@ std::string in_words(const std::vector<std::string_view>& names) {
   return text;
 }
 
+using Names = std::set<std::string>;
+
 // Whatever a file has for names.
-std::string in_words(const std::set<std::string>& nodes) {
+std::string in_words(const Names& nodes) {
   std::vector<std::string> quoted;
   quoted.reserve(nodes.size());
   for (const std::string& node : nodes) quoted.push_back(rules::quote(node));
   return rules::enumerate(quoted);
 }
 
+std::string choose_one_of(const Names& nodes) {
+  const auto example = std::find_if_not(nodes.begin(), nodes.end(), is_pattern);
+  return example == nodes.end() ? "give the node's full name with --node"
+                                : "choose one by its full name: --node " + rules::quote(*example) +
+                                      (nodes.size() > 1 ? ", for example" : "");
+}
+
+// The nodes that files name, and the patterns, but for that of every node.
+struct NamesOfFiles {
+  explicit NamesOfFiles(const std::vector<ParameterSet>& sets) {
+    for (const ParameterSet& set : sets) {
+      if (set.node.empty() || is_of_every_node(set.node)) continue;
+      (is_pattern(set.node) ? patterns : nodes).insert(set.node);
+    }
+  }
+  [[nodiscard]] Names all() const {
+    Names all = nodes;
+    all.insert(patterns.begin(), patterns.end());
+    return all;
+  }
+
+  Names nodes;
+  Names patterns;
+};
+
+// Those among which nobody has chosen; one, or none: that is it.
+Names candidates_of(const NamesOfFiles& names) {
+  if (names.nodes.size() > 1) return names.nodes;
+  if (names.nodes.empty()) return names.patterns;
+  Names result = names.nodes;
+  for (const std::string& pattern : names.patterns) {
+    if (!fits_node(pattern, *names.nodes.begin())) result.insert(pattern);
+  }
+  return result;
+}
+
+// Those that somebody means by a full name, or by the end of one.
+Names candidates_of(const NamesOfFiles& names, const std::string& node) {
+  const std::string full = join("", node);
+  if (names.nodes.count(full) != 0 || node.starts_with('/')) return {full};
+  Names result;
+  for (const std::string& each : names.nodes) {
+    if (each.ends_with(full)) result.insert(each);
+  }
+  return result.empty() ? Names{full} : result;
+}
+
+bool is_for(const std::string& name, const std::string& node) {
+  if (name.empty() || node.empty()) return true;  // the file or the user leaves it open
+  return is_pattern(name) ? fits_node(name, node) : name == node;
+}
+
 }  // namespace
 
 NodeParameters::NodeParameters(const std::vector<InputFile>& files, const MultiplexerKind& kind,
                                const MultiplexerKind& other, const std::string& node,
-                               rules::Diagnostics& diagnostics)
-    : node_(node.empty() ? "" : join("", node)) {
+                               rules::Diagnostics& diagnostics) {
   documents_.reserve(files.size());  // sets_ points into them
   for (const InputFile& file : files) {
     const rules::TextFile text(file.path, file.content);
@@ -117,42 +179,50 @@ NodeParameters::NodeParameters(const std::vector<InputFile>& files, const Multip
   if (diagnostics.has_errors()) {
     sets_.clear();
   } else {
-    choose(files, kind, other, diagnostics);
+    choose(files, kind, other, node, diagnostics);
   }
 }
 
 void NodeParameters::choose(const std::vector<InputFile>& files, const MultiplexerKind& kind,
-                            const MultiplexerKind& other, rules::Diagnostics& diagnostics) {
+                            const MultiplexerKind& other, const std::string& node,
+                            rules::Diagnostics& diagnostics) {
   const std::string wanted = in_words(kind.parameters);
-  std::set<std::string> names;
-  for (ParameterSet& set : sets_) {
-    if (is_pattern(set.node)) set.node.clear();
-    if (!set.node.empty()) names.insert(set.node);
-  }
-  const rules::Location start{files.empty() ? "" : files.front().path, 1, 1};
-  if (node_.empty() && names.size() > 1) {
-    diagnostics.error(
-        "several-nodes", sets_.front().parameters->where,
-        "several nodes have " + wanted + ": " + in_words(names) + "; choose one with --node");
+  const NamesOfFiles names(sets_);
+  const Names candidates = node.empty() ? candidates_of(names) : candidates_of(names, node);
+  if (candidates.size() > 1) {
+    const auto first = std::find_if(sets_.begin(), sets_.end(), [&](const ParameterSet& set) {
+      return candidates.count(set.node) != 0;
+    });
+    diagnostics.error("several-nodes", first->parameters->where,
+                      (node.empty() ? "several nodes have "
+                                    : "several nodes called " + rules::quote(node) + " have ") +
+                          wanted + ": " + in_words(candidates) + "; " + choose_one_of(candidates));
     sets_.clear();
     return;
   }
-  if (node_.empty() && !names.empty()) node_ = *names.begin();
-  // A node may be called by its last word, too.
-  std::erase_if(sets_, [&](const ParameterSet& set) {
-    return !set.node.empty() && set.node != node_ && !set.node.ends_with(node_);
-  });
-  for (const ParameterSet& set : sets_) {
-    if (set.node.size() > node_.size()) node_ = set.node;
+  // A pattern alone leaves it open which node it is.
+  if (!candidates.empty() && !(node.empty() && is_pattern(*candidates.begin()))) {
+    node_ = *candidates.begin();
   }
+  std::erase_if(sets_, [&](const ParameterSet& set) { return !is_for(set.node, node_); });
   if (sets_.empty()) {
-    diagnostics.error(names.empty() ? "nothing-to-import" : "no-such-node", start,
-                      names.empty()
-                          ? "no node has " + wanted + " here" + where_else(other)
-                          : "the node " + rules::quote(node_) + " has no " + wanted +
-                                " here, but " + in_words(names) + " has; choose that with --node");
+    const rules::Location start{files.empty() ? "" : files.front().path, 1, 1};
+    const Names all = names.all();
+    if (all.empty()) {
+      diagnostics.error("nothing-to-import", start,
+                        "no node has " + wanted + " here" + where_else(other));
+    } else {
+      diagnostics.error("no-such-node", start,
+                        "the node " + rules::quote(node_) + " has no " + wanted + " here, but " +
+                            in_words(all) + (all.size() == 1 ? " has; " : " have; ") +
+                            choose_one_of(all));
+    }
     return;
   }
+  require_one_form(diagnostics);
+}
+
+void NodeParameters::require_one_form(rules::Diagnostics& diagnostics) {
   for (const ParameterSet& set : sets_) {
     if (set.is_ros2 == sets_.front().is_ros2) continue;
     diagnostics.error("mixed-forms", set.parameters->where,

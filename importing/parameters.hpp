@@ -27,7 +27,7 @@ inline const MultiplexerKind cmd_vel_mux_kind{"cmd_vel_mux", {"subscribers"}};
 
 // The parameters of one node that a file has.
 struct ParameterSet {
-  std::string node;  // "/robot/twist_mux"; empty: the file leaves it open
+  std::string node;  // "/robot/twist_mux", or a pattern; empty: the file leaves it open
   bool is_ros2 = false;
   const YamlNode* parameters = nullptr;  // a map
 };
@@ -41,8 +41,9 @@ struct Parameter {
 // The parameters of one node, from all files.
 class NodeParameters {
  public:
-  // Those of a multiplexer of that kind. `node` chooses where there are several; empty: there must
-  // be one. Reports what is wrong, such as files of the other kind, and then has no sets.
+  // Those of a multiplexer of that kind. `node` chooses where there are several: its full name, or
+  // the end of it; empty: there must be one. Reports what is wrong, such as files of the other
+  // kind, and then has no sets.
   NodeParameters(const std::vector<InputFile>& files, const MultiplexerKind& kind,
                  const MultiplexerKind& other, const std::string& node,
                  rules::Diagnostics& diagnostics);
@@ -59,7 +60,9 @@ class NodeParameters {
 
  private:
   void choose(const std::vector<InputFile>& files, const MultiplexerKind& kind,
-              const MultiplexerKind& other, rules::Diagnostics& diagnostics);
+              const MultiplexerKind& other, const std::string& node,
+              rules::Diagnostics& diagnostics);
+  void require_one_form(rules::Diagnostics& diagnostics);
   [[nodiscard]] std::string where_else(const MultiplexerKind& other) const;
 
   std::vector<YamlNode> documents_;

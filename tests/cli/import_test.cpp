@@ -101,6 +101,7 @@ TEST(Import, IsRefusedWhereItIsUsedWrongly) {
   EXPECT_EQ(code({"twist_mux", yaml, "--idle", "stop"}), 2);
   EXPECT_EQ(code({"twist_mux", yaml, "--domain", "231"}), 2);
   EXPECT_EQ(code({"twist_mux", yaml, "--domain", "-1"}), 2);
+  EXPECT_EQ(code({"twist_mux", yaml, "--node", "/*/mux"}), 2);
   EXPECT_EQ(content_of(yaml), kMux);
 }
 

@@ -218,12 +218,48 @@ TEST_F(RecordingVerb, ExportsNeitherOverTheRecordingNorTwiceIntoOneFile) {
     }
   }
   const std::string out = directory_.file("new.csv");
-  const std::string same = directory_.file("./new.csv");
-  const auto result = arbiter({"recording", "export", whole_, "--trace", out, "--csv", same});
-  EXPECT_EQ(result.exit_code, 2);
-  EXPECT_THAT(result.err, HasSubstr("are one file; nothing was written"));
-  EXPECT_FALSE(std::filesystem::exists(out));
+  const std::vector<std::pair<std::string, std::string>> same = {
+      {out, directory_.file("./new.csv")},
+      {"new.csv", "./new.csv"},
+      {"./new.csv", "new.csv"},
+      {"new.csv", out},
+      {"-", "/dev/stdout"}};
+  for (const auto& [trace, csv] : same) {
+    const auto result =
+        run_program({"/usr/bin/env", "-C", directory_.path(), ARBITER_PROGRAMS "/arbiter",
+                     "recording", "export", whole_, "--trace", trace, "--csv", csv});
+    EXPECT_EQ(result.exit_code, 2) << trace << " " << csv;
+    EXPECT_THAT(result.err, HasSubstr("are one file; nothing was written"));
+    EXPECT_FALSE(std::filesystem::exists(out));
+  }
+  EXPECT_EQ(run_program({"/usr/bin/env", "-C", directory_.path(), ARBITER_PROGRAMS "/arbiter",
+                         "recording", "export", "whole.mcap", "--csv", "./whole.mcap", "--force"})
+                .exit_code,
+            2);
   EXPECT_EQ(content_of(whole_), before);
+}
+
+// Somebody may have changed it by hand, or have the recording no more.
+TEST_F(RecordingVerb, ExportsOverNoFileUnlessItIsToldTo) {
+  const std::string there = directory_.write("there.csv", "mine");
+  const std::string other = directory_.file("other.csv");
+  for (const auto& [trace, csv] : {std::pair(there, other), std::pair(other, there)}) {
+    const std::vector<std::string> verb{"recording", "export", whole_, "--trace",
+                                        trace,       "--csv",  csv};
+    const auto result = arbiter(verb);
+    EXPECT_EQ(result.exit_code, 2);
+    EXPECT_THAT(result.err, HasSubstr(there + " is there already; nothing was written: give "
+                                              "another file, or --force to replace it"));
+    EXPECT_EQ(content_of(there), "mine");
+    EXPECT_FALSE(std::filesystem::exists(other));
+  }
+  // This is no recording of Arbiter's, which is found out behind that.
+  for (const std::vector<std::string>& output :
+       {std::vector<std::string>{there, "--force"}, {"-"}, {"/dev/null"}, {"/dev/stdout"}}) {
+    std::vector<std::string> verb{"recording", "export", whole_, "--csv"};
+    verb.insert(verb.end(), output.begin(), output.end());
+    EXPECT_THAT(arbiter(verb).err, Not(HasSubstr("is there already"))) << output.front();
+  }
 }
 
 // Ports as a recorder notes them, and some that it would not.

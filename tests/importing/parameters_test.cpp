@@ -71,6 +71,109 @@ TEST(Parameters, OneOfSeveralNodesIsChosen) {
   EXPECT_THAT(import_files({file}, options).findings(), ElementsAre("1:1 error no-such-node"));
 }
 
+std::string topics_of(const std::string& name) {
+  return "{ros__parameters: {topics: {" + name + ": {topic: " + name +
+         ", timeout: 0.5, priority: 1}}}}\n";
+}
+
+std::string locks_of(const std::string& name) {
+  return "{ros__parameters: {locks: {" + name + ": {topic: " + name +
+         ", timeout: 0.5, priority: 9}}}}\n";
+}
+
+Imported import_node(const std::string& node, const std::vector<std::string>& texts) {
+  importing::ImportOptions options;
+  options.node = node;
+  return import_files(texts, options);
+}
+
+// The locks of another robot would lock this one.
+TEST(Parameters, AFullNameIsOfThatNodeOnly) {
+  const auto one =
+      import_node("/mux", {"/mux: " + topics_of("a") + "/robot2/mux: " + locks_of("l")});
+  ASSERT_TRUE(one.plan) << testing::PrintToString(one.findings());
+  EXPECT_THAT(one.topics(), ElementsAre("/a"));
+  EXPECT_EQ(one.plan->locks.size(), 0u);
+  const std::string both = "/mux: " + topics_of("a") + "/robot2/mux: " + topics_of("b");
+  for (const std::string node : {"/mux", "mux"}) {
+    const auto imported = import_node(node, {both});
+    ASSERT_TRUE(imported.plan) << node << testing::PrintToString(imported.findings());
+    EXPECT_THAT(imported.topics(), ElementsAre("/a"));
+  }
+  EXPECT_THAT(import_node("/robot2/mux", {both}).topics(), ElementsAre("/robot2/b"));
+  const auto deeper = import_node("/mux", {"/robot2/mux: " + topics_of("a")});
+  EXPECT_THAT(deeper.findings(), ElementsAre("1:1 error no-such-node"));
+  EXPECT_THAT(deeper.message("no-such-node"),
+              HasSubstr("but \"/robot2/mux\" has; choose one by its full name: --node "
+                        "\"/robot2/mux\""));
+}
+
+TEST(Parameters, TheEndOfANameIsOfOneNode) {
+  const std::string file = "/a/mux: " + topics_of("a") + "/b/mux: " + locks_of("l");
+  const auto imported = import_node("mux", {file});
+  EXPECT_THAT(imported.findings(), ElementsAre("1:27 error several-nodes"));
+  EXPECT_EQ(
+      imported.message("several-nodes"),
+      "several nodes called \"mux\" have `topics` or `locks`: \"/a/mux\" and \"/b/mux\"; choose "
+      "one by its full name: --node \"/a/mux\", for example");
+  EXPECT_THAT(import_node("a/mux", {file}).topics(), ElementsAre("/a/a"));
+  EXPECT_THAT(import_node("mux", {"/a/mux: " + topics_of("a")}).topics(), ElementsAre("/a/a"));
+  EXPECT_THAT(import_node("ux", {"/a/mux: " + topics_of("a")}).findings(),
+              ElementsAre("1:1 error no-such-node"));
+}
+
+TEST(Parameters, APatternIsOfTheNodesThatItFits) {
+  for (const std::string pattern : {"/**", "/*/mux", "/**/mux", "/a/*", "a/**"}) {
+    for (const std::string node : {"", "/a/mux", "mux"}) {
+      const auto imported =
+          import_node(node, {"/a/mux: " + topics_of("a"), pattern + ": " + locks_of("l")});
+      ASSERT_TRUE(imported.plan) << pattern << testing::PrintToString(imported.findings());
+      EXPECT_EQ(imported.plan->locks.size(), 1u) << pattern;
+    }
+  }
+  // Of another node, which somebody may have meant.
+  const std::vector<std::string> files = {"/mux: " + topics_of("a"), "/*/mux: " + locks_of("l")};
+  const auto imported = import_node("", files);
+  EXPECT_THAT(imported.findings(), ElementsAre("1:25 error several-nodes"));
+  EXPECT_THAT(imported.message("several-nodes"), HasSubstr("\"/*/mux\" and \"/mux\"; choose one by "
+                                                           "its full name: --node \"/mux\""));
+  const auto chosen = import_node("/mux", files);
+  ASSERT_TRUE(chosen.plan) << testing::PrintToString(chosen.findings());
+  EXPECT_EQ(chosen.plan->locks.size(), 0u);
+  EXPECT_THAT(import_node("/other", {"/*/mux: " + topics_of("a")}).message("no-such-node"),
+              HasSubstr("but \"/*/mux\" has; give the node's full name with --node"));
+}
+
+TEST(Parameters, SeveralPatternsAloneAreOfSeveralNodes) {
+  const std::vector<std::string> files = {"/**: {ros__parameters: {" + kTopics + "}}",
+                                          "/*/left: " + locks_of("l"),
+                                          "/*/right: " + locks_of("r")};
+  const auto open = import_files(files);
+  EXPECT_THAT(open.findings(), ElementsAre("1:28 error several-nodes"));
+  EXPECT_THAT(open.message("several-nodes"), HasSubstr("\"/*/left\" and \"/*/right\"; give the "
+                                                       "node's full name with --node"));
+  const auto imported = import_node("/robot/left", files);
+  ASSERT_TRUE(imported.plan) << testing::PrintToString(imported.findings());
+  EXPECT_THAT(imported.topics(), ElementsAre("/robot/a"));
+  EXPECT_EQ(imported.plan->locks.size(), 1u);
+  EXPECT_EQ(import_files({files[0], files[1]}).plan->locks.size(), 1u);
+}
+
+// ROS 2 reads "*" for a part of a word in no way that could be relied on.
+TEST(Parameters, APatternOfPartsOfWordsIsOfNoNode) {
+  const std::string pattern = "/other*/zz: " + locks_of("l");
+  for (const std::string node : {"", "/mux", "mux"}) {
+    const auto imported = import_node(node, {"/mux: " + topics_of("a") + pattern});
+    ASSERT_TRUE(imported.plan) << testing::PrintToString(imported.findings());
+    EXPECT_EQ(imported.plan->locks.size(), 0u);
+    EXPECT_THAT(imported.findings(), testing::Contains("2:14 warning unknown-key"));
+    EXPECT_THAT(imported.message("unknown-key"),
+                HasSubstr("no node has the parameters of \"/other*/zz\""));
+  }
+  EXPECT_THAT(import_files({pattern}).findings(),
+              ElementsAre("1:14 warning unknown-key", "1:1 error nothing-to-import"));
+}
+
 TEST(Parameters, SeveralFilesAreOne) {
   const auto imported =
       import_files({"twist_mux: {ros__parameters: {" + kTopics + "}}",

@@ -210,6 +210,17 @@ TEST(RecordedWinners, SaysThatNobodyHasWon) {
             "nobody won, at any input port\n");
 }
 
+TEST(Export, ReplacesAFileIfItIsToldTo) {
+  const TemporaryDirectory directory;
+  Incident incident;
+  const std::string there = directory.write("there.csv", "mine");
+  EXPECT_EQ(arbiter({"recording", "export", incident.file(), "--csv", there}).exit_code, 2);
+  EXPECT_EQ(content_of(there), "mine");
+  EXPECT_EQ(arbiter({"recording", "export", incident.file(), "--csv", there, "--force"}).exit_code,
+            0);
+  EXPECT_EQ(content_of(there), "t_ns,source,destination,decision,winner\n");
+}
+
 TEST(Export, NeedsToKnowWhat) {
   Incident incident;
   EXPECT_EQ(arbiter({"recording", "export", incident.file()}).exit_code, 2);

@@ -125,6 +125,26 @@ TEST_F(RecordedSample, GoesToAFileButNotToTheRecording) {
   expect_refusal(sample("/Joy/cmd:o", {"-o", file_}), "would overwrite the input");
 }
 
+TEST_F(RecordedSample, ReplacesNoFileUnlessItIsToldTo) {
+  const std::string there = directory_.write("there", "mine");
+  expect_refusal(sample("/Joy/cmd:o", {"-o", there}),
+                 there +
+                     " is there already; nothing was written: give another file, or --force to "
+                     "replace it");
+  EXPECT_EQ(content_of(there), "mine");
+  EXPECT_EQ(sample("/Joy/cmd:o", {"-o", there, "--force"}).exit_code, 0);
+  EXPECT_EQ(content_of(there), "not of Nav");
+  EXPECT_EQ(sample("/Joy/cmd:o", {"-o", "/dev/null"}).exit_code, 0);
+  EXPECT_EQ(sample("/Joy/cmd:o", {"-o", "-"}).out, "not of Nav");
+  // Where a shell has led it: to a pipe, and behind what a file has already.
+  EXPECT_EQ(sample("/Joy/cmd:o", {"-o", "/dev/stdout"}).out, "not of Nav");
+  const auto appended = run_program({"/bin/bash", "-c",
+                                     "exec " ARBITER_PROGRAMS "/arbiter recording sample " + file_ +
+                                         " --source /Joy/cmd:o -o /dev/stdout >> " + there});
+  EXPECT_EQ(appended.exit_code, 0) << appended.err;
+  EXPECT_EQ(content_of(there), "not of Navnot of Nav");
+}
+
 TEST_F(RecordedSample, ThatIsNotThereIsRefusedWithTheReason) {
   expect_refusal(sample("/Nav/cmd"), "nothing of /Nav/cmd arrived; did you mean /Nav/cmd:o?");
   expect_refusal(sample("/signals"), "/signals only signalled: it has no samples");
