@@ -88,7 +88,7 @@ class Top {
                            std::clamp<shm::Nanoseconds>(kKept / options.interval, 1, kMostKept))) {}
 
   int watch(top::Screen& screen) {
-    while (!view_.is_over()) {
+    while (!view_.is_over() && !screen.is_asked_to_end()) {
       take_news();  // first, so that what is new is in the picture
       const shm::Nanoseconds next_look = sampler_.look();
       for (const std::string& port : tapper_.take_refused()) {
@@ -207,7 +207,7 @@ void add_top(CLI::App& app, int& exit_code) {
           [options](const std::string& text) {
             options->interval = read_time("--interval", text);
             if (options->interval < kOneSecond / 50 || options->interval > 60 * kOneSecond) {
-              throw CLI::ValidationError("--interval", "must be between 20ms and 60s");
+              throw CLI::ValidationError("--interval", "must be 20ms to 60s");
             }
           },
           "How often the screen changes: 20ms to 60s, by default 100ms")

@@ -103,6 +103,22 @@ void set_handler(int signal, void (*handler)(int)) {
   ::sigaction(signal, &action, nullptr);
 }
 
+// Those that end a program from outside, but for SIGINT, SIGTERM and SIGHUP, which have been caught
+// before, and SIGKILL. One that is ignored, or that somebody uses, is left alone.
+void add_ends(sigset_t& caught) {
+  const auto add = [&](int signal) {
+    struct sigaction action {};
+    if (::sigaction(signal, nullptr, &action) == 0 && action.sa_handler == SIG_DFL) {
+      sigaddset(&caught, signal);
+    }
+  };
+  for (const int signal : {SIGQUIT, SIGUSR1, SIGUSR2, SIGALRM, SIGVTALRM, SIGPROF, SIGIO, SIGPWR,
+                           SIGSTKFLT, SIGXCPU}) {
+    add(signal);
+  }
+  for (int signal = SIGRTMIN; signal <= SIGRTMAX; ++signal) add(signal);
+}
+
 // As a descriptor, so that none is missed between two looks. ncurses ignores SIGTSTP while it
 // writes, and a Ctrl-Z of that moment would be lost; it leaves those alone that are ignored before
 // it comes, and blocked signals are kept, ignored or not.
@@ -111,6 +127,7 @@ shm::FileDescriptor catch_signals() {
   sigemptyset(&caught);
   sigaddset(&caught, SIGWINCH);
   sigaddset(&caught, SIGTSTP);
+  add_ends(caught);
   ::sigprocmask(SIG_BLOCK, &caught, nullptr);
   set_handler(SIGTSTP, SIG_IGN);
   return shm::FileDescriptor(::signalfd(-1, &caught, SFD_CLOEXEC | SFD_NONBLOCK));
@@ -166,10 +183,14 @@ void Screen::show(const std::vector<Line>& lines) const {
   ::refresh();
 }
 
-void Screen::take_up_signals() const {
+void Screen::take_up_signals() {
   signalfd_siginfo signal{};
   while (::read(signals_.get(), &signal, sizeof signal) > 0) {
-    if (signal.ssi_signo == SIGTSTP) stop();
+    if (signal.ssi_signo == SIGTSTP) {
+      stop();
+    } else if (signal.ssi_signo != SIGWINCH) {
+      is_asked_to_end_ = true;
+    }
     take_up_size();
   }
 }

@@ -24,7 +24,7 @@ class TopTerminal : public testing::Test {
 };
 
 TEST_F(TopTerminal, IsGivenBackHoweverItEnds) {
-  const std::vector<std::pair<std::string, int>> ends = {{"q", 0}, {"\x03", 0}};
+  const std::vector<std::pair<std::string, int>> ends = {{"q", 0}, {"\x03", 0}, {"\x1c", 0}};
   for (const auto& [keys, code] : ends) {
     EmulatedTerminal top({kArbiter, "top"}, top_environment(), size());
     ASSERT_TRUE(top.wait_for("INPUT PORT")) << top.text();
@@ -33,13 +33,25 @@ TEST_F(TopTerminal, IsGivenBackHoweverItEnds) {
     EXPECT_EQ(top.wait_for_end(), code);
     EXPECT_TRUE(top.is_restored());
   }
-  for (const int signal : {SIGINT, SIGTERM}) {
+  for (const int signal : {SIGINT, SIGTERM, SIGQUIT, SIGUSR1, SIGUSR2, SIGALRM, SIGIO, SIGRTMIN}) {
     EmulatedTerminal top({kArbiter, "top"}, top_environment(), size());
     ASSERT_TRUE(top.wait_for("INPUT PORT")) << top.text();
     top.send(signal);
-    EXPECT_EQ(top.wait_for_end(), 0);
-    EXPECT_TRUE(top.is_restored());
+    EXPECT_EQ(top.wait_for_end(), 0) << signal;
+    EXPECT_TRUE(top.is_restored()) << signal;
   }
+}
+
+TEST_F(TopTerminal, IsKeptAtASignalThatIsIgnored) {
+  const std::string ignoring = "trap '' QUIT USR1; exec " + kArbiter + " top";
+  EmulatedTerminal top({"/bin/bash", "-c", ignoring}, top_environment(), size());
+  ASSERT_TRUE(top.wait_for("INPUT PORT")) << top.text();
+  top.send(SIGQUIT);
+  top.send(SIGUSR1);
+  top.type("?");
+  EXPECT_TRUE(top.wait_for("Ctrl-L")) << top.text();
+  top.send(SIGINT);
+  EXPECT_EQ(top.wait_for_end(), 0);
 }
 
 // By a shell, for a program that nobody could wake again is not stopped by Ctrl-Z.
