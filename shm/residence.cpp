@@ -1,7 +1,6 @@
 #include "shm/residence.hpp"
 
 #include <sys/mman.h>
-#include <sys/resource.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -10,6 +9,7 @@
 #include <system_error>
 
 #include "shm/limits.hpp"
+#include "shm/lock_limit.hpp"
 
 namespace arbiter::shm {
 namespace {
@@ -18,16 +18,11 @@ namespace {
 // busy.
 constexpr int kMaxRanges = 4096;
 
-std::string kibibytes(std::size_t bytes) { return std::to_string((bytes + 1023) / 1024) + " KiB"; }
-
 [[noreturn]] void fail_to_lock(std::size_t bytes, int error) {
-  std::string what = "locking " + kibibytes(bytes) + " of shared memory";
-  rlimit limit{};
-  const bool is_limited = getrlimit(RLIMIT_MEMLOCK, &limit) == 0 && limit.rlim_cur != RLIM_INFINITY;
-  if (is_limited && (error == ENOMEM || error == EPERM || error == EAGAIN)) {
-    what += ": a process of this user may lock " + kibibytes(limit.rlim_cur) +
-            " (RLIMIT_MEMLOCK); raise it with ulimit -l, with LimitMEMLOCK= in a systemd unit, or "
-            "with memlock in /etc/security/limits.conf";
+  std::string what = "locking " + kibibytes(bytes) + " more of shared memory";
+  const std::string limit = lock_limit_text();
+  if (!limit.empty() && (error == ENOMEM || error == EPERM || error == EAGAIN)) {
+    what += ": " + limit;
   }
   throw std::system_error(error, std::generic_category(), what);
 }

@@ -2,6 +2,7 @@
 
 #include <fcntl.h>
 #include <sys/mman.h>
+#include <sys/resource.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -12,6 +13,7 @@
 #include <boost/interprocess/exceptions.hpp>
 
 #include "shm/foreign.hpp"
+#include "shm/lock_limit.hpp"
 
 namespace arbiter::shm {
 namespace {
@@ -35,9 +37,31 @@ constexpr int seal_bits(Seals seals) {
   return seals == Seals::kOneWriter ? fixed | F_SEAL_FUTURE_WRITE : fixed;
 }
 
+// EAGAIN: of a process that has called mlockall(), which then locks what it maps.
+[[noreturn]] void fail_to_map(std::size_t bytes, int error) {
+  std::string what = "mapping " + kibibytes(bytes) + " of shared memory";
+  const std::string limit = lock_limit_text();
+  if (error == EAGAIN && !limit.empty()) {
+    what += ", all of which would be locked (mlockall with MCL_FUTURE): " + limit +
+            ", or leave MCL_FUTURE out";
+  }
+  throw std::system_error(error, std::generic_category(), what);
+}
+
+// The process would be ended by SIGXFSZ.
+void require_file_size(std::size_t bytes) {
+  rlimit limit{};
+  if (getrlimit(RLIMIT_FSIZE, &limit) != 0 || bytes <= limit.rlim_cur) return;
+  throw std::system_error(EFBIG, std::generic_category(),
+                          "a segment of " + kibibytes(bytes) +
+                              ", which is a file: this process may write files of " +
+                              kibibytes(limit.rlim_cur) + " (RLIMIT_FSIZE, ulimit -f)");
+}
+
 }  // namespace
 
 FileDescriptor make_segment(const char* name, std::size_t size) {
+  require_file_size(size);
   FileDescriptor segment(memfd_create(name, MFD_CLOEXEC | MFD_ALLOW_SEALING));
   if (!segment) fail("memfd_create");
   if (fchmod(segment.get(), 0644) != 0) fail("fchmod of a segment");
@@ -132,7 +156,7 @@ Mapping::Mapping(const FileDescriptor& segment, std::size_t size, Access access)
                               size);
     region_.swap(region);
   } catch (const bip::interprocess_exception& error) {
-    throw std::system_error(error.get_native_error(), std::generic_category(), "mapping a segment");
+    fail_to_map(size, error.get_native_error());
   }
   if (access == Access::kReadWrite) madvise(data(), this->size(), MADV_DONTFORK);
 }
@@ -141,7 +165,7 @@ Mapping::Mapping(const FileDescriptor& segment, std::size_t size, Access access)
 // place of the old one in one step.
 void Mapping::replace(const FileDescriptor& segment) {
   void* const next = ::mmap(nullptr, size(), PROT_READ, MAP_SHARED, segment.get(), 0);
-  if (next == MAP_FAILED) fail("mapping a segment");
+  if (next == MAP_FAILED) fail_to_map(size(), errno);
   if (::mremap(next, size(), size(), MREMAP_MAYMOVE | MREMAP_FIXED, data()) == MAP_FAILED) {
     const int error = errno;
     ::munmap(next, size());

@@ -182,6 +182,19 @@ TEST(Locking, ANodeThatMayNotLockIsToldTheLimit) {
   EXPECT_THAT(error, HasSubstr("LimitMEMLOCK="));
 }
 
+// The kernel would lock all that is reserved; its own word for it is "try again".
+TEST(Locking, AProcessThatLocksAllItMapsIsToldTheLimit) {
+  Daemon daemon(single_model());
+  const ScopedLimit limit(256 * 1024);
+  ASSERT_EQ(::mlockall(MCL_FUTURE | MCL_ONFAULT), 0);
+  const std::string error = error_of([] { Node("test"); });
+  ::munlockall();
+  EXPECT_THAT(error, HasSubstr("mapping 1"));
+  EXPECT_THAT(error, HasSubstr("all of which would be locked (mlockall with MCL_FUTURE): a process "
+                               "of this user may lock 256 KiB (RLIMIT_MEMLOCK) in all; raise it"));
+  EXPECT_THAT(error, HasSubstr("or leave MCL_FUTURE out"));
+}
+
 TEST(Locking, APortThatMayNotLockIsToldTheLimitAndLeavesNothingBehind) {
   Daemon daemon(single_model());
   const ScopedLimit limit(256 * 1024);
