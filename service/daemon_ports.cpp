@@ -169,6 +169,7 @@ void Daemon::open_tap(Client& client, wire::Received& received) {
     reply.port = opened.instance;
     client.send(reply);
   });
+  switchboard_.tell_wrong_end(board_.in_force(), opened);
   log::info("{} taps the {} port {}", client.description(), is_input ? "input" : "output", name);
   introductions_.introduce(told, [this, id = client.id(), request] {
     Client* const opener = clients_.find(id);

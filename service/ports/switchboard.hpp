@@ -87,6 +87,9 @@ class Switchboard {
   // all ports, or of one. `table` of generation 0: there is no model.
   void tell_unmentioned(const shm::TableSnapshot& in_force);
   void tell_unmentioned(const shm::TableSnapshot& in_force, shm::PortInstance port);
+  // Tells who taps an output port by the name that is an input port's in the model, or the other
+  // way round. One that nobody has named yet may come.
+  void tell_wrong_end(const shm::TableSnapshot& in_force, const Tap& tap) const;
   // A component says that its port cannot see all that its rules read: for the log, once.
   void note_blind(shm::PortInstance port, const std::string& text);
   // What its component says of it.

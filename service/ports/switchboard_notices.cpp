@@ -122,6 +122,37 @@ void Switchboard::tell_unmentioned(const shm::TableSnapshot& in_force) {
   for (const auto& [instance, input] : inputs_) tell_unmentioned(in_force, instance);
 }
 
+void Switchboard::tell_wrong_end(const shm::TableSnapshot& in_force, const Tap& tap) const {
+  const auto is_among = [&](const auto& names, const auto& is_mentioned) {
+    return std::any_of(names.begin(), names.end(), [&](const auto& each) {
+      return each->name == tap.name && is_mentioned(each->id);
+    });
+  };
+  const auto is_source = [&] {
+    return is_among(names_.sources(),
+                    [&](shm::SourceId id) { return in_force.table.knows_source(id); });
+  };
+  const auto is_input = [&] {
+    return is_among(names_.inputs(), [&](shm::PortId id) { return in_force.table.knows_port(id); });
+  };
+  if (in_force.generation == 0) return;
+  const bool is_wrong = tap.is_input ? !is_input() && is_source() : !is_source() && is_input();
+  if (!is_wrong) return;
+  const std::string text =
+      "in the model in force " + tap.name +
+      (tap.is_input ? " is an output port, and here it is tapped as an input port, so that nothing "
+                      "comes; leave TapOf::input out"
+                    : " is an input port, and here it is tapped as an output port, so that nothing "
+                      "comes; write TapOf::input");
+  log_event({EventKind::kUnmentioned, {tap.client->name}, {}, {tap.name}}, log::level::warn,
+            "{}: {}", tap.client->description(), text);
+  wire::Message message;
+  message.kind = wire::MessageKind::kUnmentioned;
+  message.port = tap.instance;
+  message.set_text(text);
+  tap.client->send(message);
+}
+
 void Switchboard::note_blind(shm::PortInstance port, const std::string& text) {
   const auto output = outputs_.find(port);
   const auto input = inputs_.find(port);

@@ -1,6 +1,9 @@
 // Taps of input ports: all their sources, and what became of samples at the take.
 #include <gtest/gtest.h>
 
+#include <string>
+#include <vector>
+
 #include <arbiter/arbiter.hpp>
 
 #include "tests/client/component.hpp"
@@ -34,6 +37,31 @@ TEST(Tap, OfAnInputPortSeesAllSourcesThatTheModelConnectsToIt) {
   expect("/high", 2);
   expect("/low", 4);
   EXPECT_FALSE(next_of(tap)) << "/stop is only sensed";
+}
+
+// A name that nobody has yet may come; one of the other kind waits in vain.
+TEST(Tap, OfAPortOfTheOtherKindIsToldSo) {
+  Daemon daemon(override_model());
+  std::vector<std::string> told;
+  NodeOptions options;
+  options.service_thread = false;
+  options.on_notice = [&](const Notice& notice) {
+    EXPECT_EQ(notice.kind, NoticeKind::unmentioned);
+    told.push_back(notice.text);
+  };
+  Node node("test", options);
+  auto as_output = node.tap<Number>("/in");
+  auto as_input = node.tap<Number>("/low", {.of = TapOf::input});
+  auto right = node.tap<Number>("/low");
+  auto right_too = node.tap<Number>("/in", {.of = TapOf::input});
+  auto unknown = node.tap<Number>("/nobody");
+  node.service();
+  EXPECT_EQ(told,
+            (std::vector<std::string>{
+                "in the model in force /in is an input port, and here it is tapped as an output "
+                "port, so that nothing comes; write TapOf::input",
+                "in the model in force /low is an output port, and here it is tapped as an input "
+                "port, so that nothing comes; leave TapOf::input out"}));
 }
 
 // What became of accepted samples after they were accepted. `in` is /in.

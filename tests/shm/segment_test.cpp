@@ -4,11 +4,13 @@
 #include <fcntl.h>
 #include <gtest/gtest.h>
 #include <sys/mman.h>
+#include <sys/resource.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <cerrno>
+#include <string>
 
 #include "shm/bell.hpp"
 #include "tests/support/error_of.hpp"
@@ -77,6 +79,21 @@ TEST_F(SealedSegment, OpenedAnewForWritingItStillCannotBeMappedWritable) {
 TEST_F(SealedSegment, ItsMemoryCanStillBeAllocated) {
   EXPECT_FALSE(allocate(segment_, 0, kSize));
   EXPECT_TRUE(allocate(segment_, kSize, 1)) << "but not beyond its end";
+}
+
+// The kernel would end the process.
+TEST(Segment, ThatIsLargerThanAFileMayBeIsAnError) {
+  rlimit before{};
+  ASSERT_EQ(::getrlimit(RLIMIT_FSIZE, &before), 0);
+  const rlimit small{1 << 20, before.rlim_max};
+  ASSERT_EQ(::setrlimit(RLIMIT_FSIZE, &small), 0);
+  const std::string what = test::error_of([] { make_segment("test", (1 << 20) + 1); });
+  EXPECT_NE(make_segment("test", 1 << 20).get(), -1);
+  ASSERT_EQ(::setrlimit(RLIMIT_FSIZE, &before), 0);
+  EXPECT_NE(what.find("a segment of 1025 KiB, which is a file: this process may write files of "
+                      "1024 KiB (RLIMIT_FSIZE, ulimit -f)"),
+            what.npos)
+      << what;
 }
 
 TEST(Segment, OneHandedOutReadOnlyCannotBeMappedWritable) {

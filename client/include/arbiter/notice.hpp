@@ -16,7 +16,8 @@ enum class NoticeKind : std::uint8_t {
   // selected, its samples are refused, and the input port is idle.
   refused,
   // The model in force does not mention the port, or there is no model: an output port delivers
-  // nothing, and nothing arrives at an input port.
+  // nothing, and nothing arrives at an input port. Or it mentions it as a port of the other kind
+  // than the one that is tapped.
   unmentioned,
   // The port cannot see a source that its rules read: it delivers nothing until it can.
   blind,
