@@ -131,7 +131,11 @@ class PageRun {
       exit_code_ = result.exit_code;
       correction.text += "$ " + command.text + "\n" + result.out;
       if (updates()) continue;
-      EXPECT_EQ(result.out, command.output) << "$ " << command.text;
+      EXPECT_EQ(result.out, command.output)
+          << "$ " << command.text
+          << "\nIf what it prints now is right, ARBITER_UPDATE_PAGES=1 lets this test write it "
+             "into "
+             "the page.";
       if (command.output.empty()) {
         EXPECT_EQ(result.exit_code, 0) << "$ " << command.text;
       }
