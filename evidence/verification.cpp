@@ -64,12 +64,14 @@ class Verifier {
     Judge::Connection connection{};
     const Permitted permitted = judge->permitted(*live.run, *live.decision, *live.port, connection);
     if (connection == Judge::Connection::none) {
-      differ(live, "the model does not connect the two");
+      differ(live, [] { return "the model does not connect the two"; });
     } else if (!permitted.has(live.won)) {
-      differ(live, std::string("the model ") + (live.won ? "discards" : "delivers") +
-                       " it; by the recording: " + activities_at(*judge, live));
+      differ(live, [&] {
+        return std::string("the model ") + (live.won ? "discards" : "delivers") +
+               " it; by the recording: " + activities_at(*judge, live);
+      });
     } else if (!fits_timeout(*live.run, *live.decision, models_)) {
-      differ(live, "its source was made active for another time than the model's T");
+      differ(live, [] { return "its source was made active for another time than the model's T"; });
     } else if (permitted.is_sure()) {
       ++result_.equal;
     } else if (permitted.rests_on_gap) {
@@ -82,9 +84,11 @@ class Verifier {
   Verification finish() { return std::move(result_); }
 
  private:
-  void differ(const LiveDecision& live, std::string text) {
+  // For the first alone: to find the activities takes all steps of their sources.
+  template <class Text>
+  void differ(const LiveDecision& live, const Text& text) {
     ++result_.different;
-    if (!result_.first) result_.first = {live, std::move(text)};
+    if (!result_.first) result_.first = {live, text()};
   }
 
   Models& models_;

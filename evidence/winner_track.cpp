@@ -1,6 +1,8 @@
 #include "evidence/winner_track.hpp"
 
 #include <algorithm>
+#include <string_view>
+#include <unordered_set>
 #include <utility>
 
 #include "shm/picture.hpp"
@@ -88,12 +90,11 @@ void WinnerTrack::note_end(const std::string& source, ActivityWord word) {
 void WinnerTrack::look_at_all(Nanoseconds time, WinnerChange::Why why) {
   static const std::map<shm::PortId, std::string> no_ports;
   const auto& ports = rules_ == nullptr ? no_ports : rules_->ports;
+  std::unordered_set<std::string_view> known;
+  for (const auto& [id, name] : ports) known.insert(name);
   std::vector<std::string> gone;
   for (const auto& [port, winner] : winners_) {
-    const bool is_known =
-        std::any_of(ports.begin(), ports.end(),
-                    [&, &name = port](const auto& each) { return each.second == name; });
-    if (!is_known) gone.push_back(port);
+    if (known.count(port) == 0) gone.push_back(port);
   }
   for (const std::string& port : gone) {
     tell_({port, "", std::exchange(winners_[port], ""), time, why, "", generation_});

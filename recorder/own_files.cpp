@@ -58,7 +58,7 @@ bool OwnFiles::is_there(const File& file) {
 std::vector<std::string> OwnFiles::add(const std::string& path) {
   struct stat made {};
   if (::lstat(path.c_str(), &made) == 0) files_.push_back({path, made.st_dev, made.st_ino});
-  std::erase_if(files_, [](const File& file) { return !is_there(file); });
+  forget_those_gone();
   std::vector<std::string> removed;
   while (files_.size() > most_) {
     if (::unlink(files_.front().path.c_str()) == 0) removed.push_back(files_.front().path);
@@ -66,6 +66,19 @@ std::vector<std::string> OwnFiles::add(const std::string& path) {
   }
   write_list();
   return removed;
+}
+
+std::string OwnFiles::remove_oldest() {
+  forget_those_gone();
+  if (files_.size() < 2 || ::unlink(files_.front().path.c_str()) != 0) return "";
+  std::string removed = std::move(files_.front().path);
+  files_.pop_front();
+  write_list();
+  return removed;
+}
+
+void OwnFiles::forget_those_gone() {
+  std::erase_if(files_, [](const File& file) { return !is_there(file); });
 }
 
 // A line for each: its device, its inode, and its name in the directory of the list.

@@ -23,6 +23,8 @@ class OwnFiles {
   // This one has been written. Returns those that were removed for it, the oldest. A list that
   // cannot be written, as on a full disk, counts for this run all the same.
   std::vector<std::string> add(const std::string& path);
+  // Where the disk is full. Returns which one; empty: there is none but the newest, which stays.
+  std::string remove_oldest();
 
  private:
   struct File {
@@ -32,6 +34,7 @@ class OwnFiles {
   };
 
   [[nodiscard]] static bool is_there(const File& file);
+  void forget_those_gone();
   void read_list();
   void write_list() const;
 

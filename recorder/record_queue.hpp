@@ -38,17 +38,33 @@ struct Batch {
   }
 };
 
+// Bytes.
+struct Waiting {
+  std::size_t records = 0;  // but for their payloads
+  std::size_t payloads = 0;
+
+  void add(const Record& record) {
+    const std::size_t payload = evidence::payload_size_of(record);
+    records += evidence::size_of(record) - payload;
+    payloads += payload;
+  }
+  [[nodiscard]] std::size_t all() const { return records + payloads; }
+};
+
 class RecordQueue {
  public:
-  // Returns how many bytes wait now.
-  std::size_t push(Batch&& batch) {
-    std::size_t size = 0;
-    for (const RecordPtr& record : batch.records) size += evidence::size_of(*record);
+  void push(Batch&& batch) {
+    Waiting size;
+    for (const RecordPtr& record : batch.records) size.add(*record);
     const std::lock_guard lock(mutex_);
-    bytes_ += size;
+    waiting_.records += size.records;
+    waiting_.payloads += size.payloads;
     batches_.emplace_back(std::move(batch), size);
     filled_.notify_one();
-    return bytes_;
+  }
+  [[nodiscard]] Waiting waiting() {
+    const std::lock_guard lock(mutex_);
+    return waiting_;
   }
   // Waits for a batch; nothing: none has come in that time, or none will.
   std::optional<Batch> pop(std::chrono::milliseconds patience) {
@@ -57,7 +73,8 @@ class RecordQueue {
     if (batches_.empty()) return std::nullopt;
     auto [batch, size] = std::move(batches_.front());
     batches_.pop_front();
-    bytes_ -= size;
+    waiting_.records -= size.records;
+    waiting_.payloads -= size.payloads;
     return std::move(batch);
   }
   // Nothing more comes.
@@ -74,8 +91,8 @@ class RecordQueue {
  private:
   std::mutex mutex_;
   std::condition_variable filled_;
-  std::deque<std::pair<Batch, std::size_t>> batches_;
-  std::size_t bytes_ = 0;
+  std::deque<std::pair<Batch, Waiting>> batches_;
+  Waiting waiting_;
   bool is_closed_ = false;
 };
 

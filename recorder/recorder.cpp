@@ -55,19 +55,17 @@ void Recorder::take_new_taps() {
 void Recorder::poll_taps() {
   take_new_taps();
   const Nanoseconds now = shm::monotonic_now();
-  const Room room = waiting_bytes_ > options_.queue_bytes           ? Room::none
-                    : waiting_bytes_ > options_.queue_bytes / 4 * 3 ? Room::no_payloads
-                                                                    : Room::all;
+  Backlog backlog{queue_.waiting(), options_.queue_bytes};
   Batch batch;
   bool ports_changed = false;
   for (const auto& tap : taps_) {
-    ports_changed = tap->poll(room, batch.records) || ports_changed;
+    ports_changed = tap->poll(backlog, batch.records) || ports_changed;
   }
   if (ports_changed) watcher_.note_ports_changed();
   batch.horizon = std::exchange(last_poll_, now);
   if (batch.records.empty() && now - last_push_ < kPushEvery) return;
   last_push_ = now;
-  waiting_bytes_ = queue_.push(std::move(batch));
+  queue_.push(std::move(batch));
 }
 
 void Recorder::count(const TapReader& tap) {

@@ -58,7 +58,6 @@ class Recorder {
   shm::FileDescriptor failed_;  // readable: the pipeline has ended
   Pipeline pipeline_;
   std::vector<std::shared_ptr<TapReader>> taps_;
-  std::size_t waiting_bytes_ = 0;
   Nanoseconds last_poll_ = 0;
   Nanoseconds last_push_ = 0;
   Nanoseconds started_ = 0;

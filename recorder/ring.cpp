@@ -13,6 +13,7 @@
 namespace arbiter::recorder {
 namespace {
 
+using evidence::Missed;
 using evidence::PortChange;
 using evidence::SourceState;
 
@@ -21,8 +22,24 @@ constexpr std::size_t kMostWaiting = 64;
 // What is written of its own accord rests for as long, or for half of the span that is kept: so
 // nothing is missed.
 constexpr Nanoseconds kMostRest = 10'000'000'000;
+// Of its own files, where the disk is full: what fills it may be somebody else's.
+constexpr std::size_t kMostRemovedForRoom = 4;
 
 bool is_of_own_accord(Cause cause) { return cause == Cause::when || cause == Cause::death; }
+
+// What a file may be without, so that what it has reaches back further.
+struct Shares {
+  std::size_t payloads;  // of the memory: beyond it, they give way before records do
+  std::size_t payload;   // one that has more would leave no room for others'
+};
+Shares shares_of(std::size_t memory) { return {memory / 2, memory / 4}; }
+
+// Copies no payload.
+RecordPtr without_payload(const evidence::Arrival& from) {
+  return std::make_shared<const Record>(
+      evidence::Arrival{from.context, from.time, from.seen, from.is_sample, from.sequence,
+                        from.size, from.generation, from.word, from.masks, from.origin});
+}
 
 SourceState state_of(const evidence::ContextPtr& context, Nanoseconds time, Nanoseconds seen,
                      std::uint64_t sequence, std::uint64_t generation,
@@ -73,25 +90,59 @@ std::uint64_t Ring::request(Cause cause) {
 }
 
 void Ring::write(const RecordPtr& record) {
-  records_.push_back(record);
-  bytes_ += evidence::size_of(*record);
+  add(record);
   // A time in the future is no reason to forget what is kept.
   const Nanoseconds newest = std::min(evidence::time_of(*record), shm::monotonic_now());
-  while (!records_.empty() && (bytes_ > options_.memory ||
-                               evidence::time_of(*records_.front()) < newest - options_.span)) {
+  while (!records_.empty() &&
+         evidence::time_of(*records_.front().record) < newest - options_.span) {
     forget_oldest();
   }
+  make_room();
   const auto* port = std::get_if<PortChange>(&*record);
   if (options_.on_death && port != nullptr && port->what == PortChange::What::died) {
     request(Cause::death);
   }
 }
 
+void Ring::add(const RecordPtr& record) {
+  const std::size_t payload = evidence::payload_size_of(*record);
+  if (payload > shares_of(options_.memory).payload) {
+    records_.push_back({without_payload(std::get<evidence::Arrival>(*record)), true});
+  } else {
+    if (payload != 0) payloads_.push_back(forgotten_ + records_.size());
+    payload_bytes_ += payload;
+    records_.push_back({record, false});
+  }
+  bytes_ += evidence::size_of(*records_.back().record);
+}
+
+void Ring::make_room() {
+  while (bytes_ > options_.memory) {
+    if (payload_bytes_ > shares_of(options_.memory).payloads) {
+      drop_oldest_payload();
+    } else {
+      forget_oldest();
+    }
+  }
+}
+
 void Ring::forget_oldest() {
-  const RecordPtr record = std::move(records_.front());
+  const RecordPtr record = std::move(records_.front().record);
   records_.pop_front();
+  if (!payloads_.empty() && payloads_.front() == forgotten_) payloads_.pop_front();
+  ++forgotten_;
   bytes_ -= evidence::size_of(*record);
+  payload_bytes_ -= evidence::payload_size_of(*record);
   sum_up(*record);
+}
+
+void Ring::drop_oldest_payload() {
+  Kept& kept = records_[payloads_.front() - forgotten_];
+  payloads_.pop_front();
+  const std::size_t payload = evidence::payload_size_of(*kept.record);
+  kept = {without_payload(std::get<evidence::Arrival>(*kept.record)), true};
+  bytes_ -= payload;
+  payload_bytes_ -= payload;
 }
 
 // The file begins when the last of what is summed up has happened, or was heard of: all of it was
@@ -117,6 +168,11 @@ void Ring::sum_up(const Record& record) {
     note(state_of(over->context, over->time, over->seen, over->sequence, over->generation,
                   shm::deactivation(over->time)));
   } else if (const auto* state = std::get_if<SourceState>(&record)) {
+    if (state->why != SourceState::Why::page) {  // its publisher tells of it now
+      for (const auto why : {Missed::Why::refused, Missed::Why::stranger}) {
+        untapped_.erase({state->context->source, why});
+      }
+    }
     note(state_of(state->context, state->time, state->seen, state->sequence, state->generation,
                   state->word));
   } else if (const auto* change = std::get_if<evidence::DestinationsChange>(&record)) {
@@ -138,8 +194,10 @@ void Ring::sum_up(const Record& record) {
     kept.why = evidence::WinnerChange::Why::start;
     kept.by.clear();
     if (winner->winner.empty()) winners_.erase(winner->port);
-  } else if (const auto* missed = std::get_if<evidence::Missed>(&record)) {
-    if (missed->why == evidence::Missed::Why::refused) untapped_[missed->source] = *missed;
+  } else if (const auto* missed = std::get_if<Missed>(&record)) {
+    using Why = Missed::Why;
+    const bool is_untapped = missed->why == Why::refused || missed->why == Why::stranger;
+    if (is_untapped) untapped_[{missed->source, missed->why}] = *missed;
   }
 }
 
@@ -180,27 +238,71 @@ void Ring::write_due(Nanoseconds now, Nanoseconds asked_by) {
 void Ring::dump(Cause cause, std::vector<std::uint64_t> requests) {
   Dumped dumped;
   dumped.requests = std::move(requests);
-  const std::string part = options_.prefix + ".part";
-  try {
-    ::unlink(part.c_str());  // of a recorder that was killed
-    write_file(part);
-    dumped.file = give_name(part, cause);
-    ++dumps_;
-    if (is_of_own_accord(cause)) dumped.removed = own_files_.add(dumped.file);
-  } catch (const std::exception& error) {
-    ::unlink(part.c_str());
-    dumped.error = error.what();
+  while (dumped.file.empty() && dumped.error.empty()) {
+    try {
+      dumped.file = write_file(cause);
+      ++dumps_;
+      if (!is_of_own_accord(cause)) break;
+      for (std::string& each : own_files_.add(dumped.file)) {
+        dumped.removed.push_back(std::move(each));
+      }
+    } catch (const recording::NoRoomError& error) {
+      const bool may_remove = dumped.removed.size() < kMostRemovedForRoom;
+      std::string removed = may_remove ? own_files_.remove_oldest() : "";
+      if (removed.empty()) {
+        dumped.error = error.what();
+      } else {
+        dumped.removed.push_back(std::move(removed));
+      }
+    } catch (const std::exception& error) {
+      dumped.error = error.what();
+    }
   }
   options_.told(dumped);
 }
 
-void Ring::write_file(const std::string& path) const {
+// Returns its name.
+std::string Ring::write_file(Cause cause) const {
+  const std::string part = options_.prefix + ".part";
   recording::McapOptions options = options_.file;
   options.unfinished = recording::Unfinished::discard;
-  evidence::RecordWriter writer(path, options, options_.info);
-  write_base(writer);
-  for (const RecordPtr& record : records_) writer.write(*record);
-  writer.close(horizon_);
+  evidence::RecordingInfo info = options_.info;
+  info.wall_offset = options_.wall_offset();
+  ::unlink(part.c_str());  // of a recorder that was killed
+  try {
+    evidence::RecordWriter writer(part, options, info);
+    write_base(writer);
+    write_records(writer);
+    writer.close(horizon_);
+    return give_name(part, cause, info.wall_offset);
+  } catch (...) {
+    ::unlink(part.c_str());
+    throw;
+  }
+}
+
+// What had to give way of a source is told once, with the last arrival that lacks it.
+void Ring::write_records(evidence::RecordWriter& writer) const {
+  std::map<std::string, Missed> missed;
+  for (const Kept& kept : records_) {
+    if (!kept.lacks_payload) continue;
+    const auto& arrival = std::get<evidence::Arrival>(*kept.record);
+    const std::string& source = arrival.context->source;
+    const auto all = missed
+                         .try_emplace(source, evidence::Missed{source, arrival.time, arrival.time,
+                                                               0, 0, Missed::Why::memory, ""})
+                         .first;
+    all->second.to = std::max(all->second.to, arrival.time);
+    ++all->second.samples;
+  }
+  std::map<std::string, std::uint64_t> passed;
+  for (const Kept& kept : records_) {
+    writer.write(*kept.record);
+    if (!kept.lacks_payload) continue;
+    const std::string& source = evidence::context_of(*kept.record)->source;
+    const Missed& all = missed.at(source);
+    if (++passed[source] == all.samples) writer.write(all);
+  }
 }
 
 // As a recording begins: its start, the states, the model.
@@ -217,8 +319,9 @@ void Ring::write_base(evidence::RecordWriter& writer) const {
 }
 
 // Under its name there is a whole file, or none.
-std::string Ring::give_name(const std::string& written, Cause cause) const {
-  const std::time_t now = std::time(nullptr);
+std::string Ring::give_name(const std::string& written, Cause cause,
+                            std::int64_t wall_offset) const {
+  const std::time_t now = (shm::monotonic_now() + wall_offset) / 1'000'000'000;
   std::tm parts{};
   gmtime_r(&now, &parts);
   char stamp[32];

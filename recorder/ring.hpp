@@ -4,7 +4,8 @@
 // accord, by the number of files, and by a rest after each (kMostRest), at the end of which one
 // file has all that has come meanwhile. What leaves it has been summed up: the state
 // of each source, the model, the open ports and the winners at the moment where the rest begins. So
-// each file is whole: it begins as any recording does.
+// each file is whole: it begins as any recording does. Large samples do not drive out who
+// commanded: beyond half of the memory, payloads give way before records do.
 #pragma once
 
 #include <cstddef>
@@ -43,7 +44,10 @@ struct RingOptions {
   // How many files are kept of those that it writes of its own accord.
   std::size_t keep = 16;
   recording::McapOptions file;
-  evidence::RecordingInfo info;
+  evidence::RecordingInfo info;  // but for its wall_offset
+  // Asked before each file, for what is in it and for its name: the wall clock may be set
+  // meanwhile, as on a robot that has none while it is off.
+  std::function<std::int64_t()> wall_offset = evidence::wall_offset_now;
   // Dump where a component has died.
   bool on_death = true;
   // On the pipeline's thread.
@@ -69,28 +73,40 @@ class Ring : public Sink {
 
  private:
   void write_due(Nanoseconds now, Nanoseconds asked_by);
+  void add(const RecordPtr& record);
+  void make_room();
   void forget_oldest();
+  void drop_oldest_payload();
   void sum_up(const Record& record);
   [[nodiscard]] bool is_resting(Cause cause, Nanoseconds now) const;
   void dump(Cause cause, std::vector<std::uint64_t> requests);
-  void write_file(const std::string& path) const;
+  std::string write_file(Cause cause) const;
+  void write_records(evidence::RecordWriter& writer) const;
   void write_base(evidence::RecordWriter& writer) const;
-  [[nodiscard]] std::string give_name(const std::string& written, Cause cause) const;
+  [[nodiscard]] std::string give_name(const std::string& written, Cause cause,
+                                      std::int64_t wall_offset) const;
 
   const RingOptions options_;
   OwnFiles own_files_;
   std::map<Cause, Nanoseconds> written_at_;  // the last file that was written of its own accord
   bool is_ending_ = false;
   Nanoseconds horizon_ = 0;  // what happened before is here
-  std::deque<RecordPtr> records_;
+  struct Kept {
+    RecordPtr record;
+    bool lacks_payload = false;  // which had to give way
+  };
+  std::deque<Kept> records_;
+  std::uint64_t forgotten_ = 0;         // how many were before these
+  std::deque<std::uint64_t> payloads_;  // numbers of the records that have one, from forgotten_ on
   std::size_t bytes_ = 0;
+  std::size_t payload_bytes_ = 0;  // of these
   std::uint64_t dumps_ = 0;
 
   // What was so at base_time_, where records_ begin.
   Nanoseconds base_time_ = 0;
   std::optional<evidence::Start> start_;
   std::map<std::string, evidence::SourceState> sources_;
-  std::map<std::string, evidence::Missed> untapped_;
+  std::map<std::pair<std::string, evidence::Missed::Why>, evidence::Missed> untapped_;
   std::optional<evidence::ModelChange> model_;
   std::map<std::pair<bool, std::string>, evidence::PortChange> ports_;
   std::map<std::string, evidence::WinnerChange> winners_;

@@ -71,17 +71,23 @@ void add(std::vector<RecordPtr>& records, T record) {
 
 }  // namespace
 
-bool TapReader::poll(Room room, std::vector<RecordPtr>& records) {
+bool TapReader::poll(Backlog& backlog, std::vector<RecordPtr>& records) {
+  std::size_t counted = records.size();
+  const auto count = [&] {
+    for (; counted < records.size(); ++counted) backlog.waiting.add(*records[counted]);
+  };
   bool ports_changed = false;
   auto [polls, is_live] = polled();
-  if (room != Room::none) tell_left_out(records);
+  if (backlog.room() != Room::none) tell_left_out(records);
+  count();
   for (int i = 0; i < kMostEvents; ++i) {
     const auto event = tap_.take();
     if (!event) break;
     const TapEventKind kind = event->kind();
     ports_changed = ports_changed || kind == TapEventKind::state || kind == TapEventKind::closed ||
                     kind == TapEventKind::destinations;
-    take(*event, room, records);
+    take(*event, backlog, records);
+    count();
     is_live = kind != TapEventKind::closed;
     told_.store(word_of(*event), std::memory_order_relaxed);
   }
@@ -90,16 +96,17 @@ bool TapReader::poll(Room room, std::vector<RecordPtr>& records) {
 }
 
 // The clock is read once the event has come: what it tells has happened by then.
-void TapReader::take(const TapEvent<>& event, Room room, std::vector<RecordPtr>& records) {
+void TapReader::take(const TapEvent<>& event, const Backlog& backlog,
+                     std::vector<RecordPtr>& records) {
   const Nanoseconds seen = shm::monotonic_now();
-  if (room == Room::none) {
+  if (backlog.room() == Room::none) {
     leave_out(event, seen);
     return;
   }
   switch (event.kind()) {
     case TapEventKind::sample:
     case TapEventKind::signal:
-      add_arrival(event, seen, room, records);
+      add_arrival(event, seen, backlog, records);
       break;
     case TapEventKind::deactivation:
       add(records, evidence::Deactivation{context_of(event), ns(event.time()), seen,
@@ -139,7 +146,7 @@ void TapReader::add_state(const TapEvent<>& event, Nanoseconds seen,
   add(records, std::move(state));
 }
 
-void TapReader::add_arrival(const TapEvent<>& event, Nanoseconds seen, Room room,
+void TapReader::add_arrival(const TapEvent<>& event, Nanoseconds seen, const Backlog& backlog,
                             std::vector<RecordPtr>& records) {
   Arrival arrival;
   const auto destinations = event.destinations();
@@ -155,16 +162,23 @@ void TapReader::add_arrival(const TapEvent<>& event, Nanoseconds seen, Room room
   arrival.origin = {event.origin().publisher, event.origin().sequence};
   ++counts_.arrivals;
   if (with_payloads_ && arrival.is_sample) {
-    const auto bytes = event.sample();
-    if (bytes && room == Room::all) {
-      arrival.payload.emplace(bytes->begin(), bytes->end());
-    } else {
+    if (const auto why = take_payload(event, backlog, arrival)) {
       ++counts_.lost_samples;
-      add(records, Missed{arrival.context->source, arrival.time, arrival.time, 0, 1,
-                          bytes ? Missed::Why::queue : Missed::Why::overtaken, ""});
+      add(records, Missed{arrival.context->source, arrival.time, arrival.time, 0, 1, *why, ""});
     }
   }
   add(records, std::move(arrival));
+}
+
+// Nothing, or why it is left out.
+std::optional<Missed::Why> TapReader::take_payload(const TapEvent<>& event, const Backlog& backlog,
+                                                   Arrival& arrival) const {
+  const auto bytes = event.sample();
+  if (!bytes) return Missed::Why::overtaken;
+  if (bytes->size() > most_payload_) return Missed::Why::too_large;
+  if (!backlog.has_room_for(bytes->size())) return Missed::Why::queue;
+  arrival.payload.emplace(bytes->begin(), bytes->end());
+  return std::nullopt;
 }
 
 void TapReader::leave_out(const TapEvent<>& event, Nanoseconds seen) {

@@ -2,9 +2,11 @@
 //
 // Where the queue to the writer is nearly full, payloads are left out; where it is full, events
 // are. Either is counted and told as soon as there is room; behind events that are missing comes a
-// state, so that who reads the recording knows where he stands.
+// state, so that who reads the recording knows where he stands. A payload that no reader of the
+// file would be ready for is left out, too.
 #pragma once
 
+#include <algorithm>
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
@@ -16,11 +18,29 @@
 #include <arbiter/tap.hpp>
 
 #include "recorder/record_queue.hpp"
+#include "recording/mcap.hpp"
 
 namespace arbiter::recorder {
 
 // What there is room for.
 enum class Room : std::uint8_t { all, no_payloads, none };
+
+// What waits for the writer, with what has been read in this round, and how much may.
+struct Backlog {
+  Waiting waiting;
+  std::size_t most = 0;
+
+  // Payloads, however large, leave a quarter for records.
+  [[nodiscard]] Room room() const {
+    const std::size_t share = most / 4 * 3;
+    if (waiting.records + std::min(waiting.payloads, share) > most) return Room::none;
+    return waiting.all() > share ? Room::no_payloads : Room::all;
+  }
+  // One that is larger than all that may wait has room where little waits.
+  [[nodiscard]] bool has_room_for(std::size_t payload) const {
+    return room() == Room::all && (waiting.all() <= most / 4 || payload <= most - waiting.all());
+  }
+};
 
 struct TapCounts {
   std::uint64_t arrivals = 0;
@@ -38,14 +58,18 @@ struct LeftOut {
 
 class TapReader {
  public:
-  // `before`: what its page said.
-  TapReader(Tap<> tap, bool with_payloads, evidence::ActivityWord before)
-      : tap_(std::move(tap)), with_payloads_(with_payloads), told_(before) {}
+  // `before`: what its page said. `most_payload`: what readers are ready for.
+  TapReader(Tap<> tap, bool with_payloads, evidence::ActivityWord before,
+            std::size_t most_payload = recording::kMaxMessageBytes)
+      : tap_(std::move(tap)),
+        with_payloads_(with_payloads),
+        most_payload_(most_payload),
+        told_(before) {}
 
   // The thread that polls.
 
   // Appends what has happened since; returns true if ports have been opened or closed.
-  bool poll(Room room, std::vector<RecordPtr>& records);
+  bool poll(Backlog& backlog, std::vector<RecordPtr>& records);
   [[nodiscard]] const TapCounts& counts() const { return counts_; }
   // Nothing more will be read: says what was left out last.
   void finish(std::vector<RecordPtr>& records);
@@ -69,16 +93,20 @@ class TapReader {
   [[nodiscard]] const std::string& name() const { return tap_.name(); }
 
  private:
-  void take(const TapEvent<>& event, Room room, std::vector<RecordPtr>& records);
+  void take(const TapEvent<>& event, const Backlog& backlog, std::vector<RecordPtr>& records);
   void add_state(const TapEvent<>& event, Nanoseconds seen, std::vector<RecordPtr>& records);
-  void add_arrival(const TapEvent<>& event, Nanoseconds seen, Room room,
+  void add_arrival(const TapEvent<>& event, Nanoseconds seen, const Backlog& backlog,
                    std::vector<RecordPtr>& records);
+  [[nodiscard]] std::optional<evidence::Missed::Why> take_payload(const TapEvent<>& event,
+                                                                  const Backlog& backlog,
+                                                                  evidence::Arrival& arrival) const;
   void leave_out(const TapEvent<>& event, Nanoseconds seen);
   void tell_left_out(std::vector<RecordPtr>& records);
   const evidence::ContextPtr& context_of(const TapEvent<>& event);
 
   Tap<> tap_;
   const bool with_payloads_;
+  const std::size_t most_payload_;
   evidence::ContextPtr context_;
   std::optional<LeftOut> left_out_;
   TapCounts counts_;

@@ -23,6 +23,11 @@ class McapError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
+// The disk is full, or a quota is reached.
+class NoRoomError : public McapError {
+ public:
+  using McapError::McapError;
+};
 
 using McapTime = std::uint64_t;
 // Called often, so that whoever waits can be shown how far it is: `done` of `all`, in bytes of the
@@ -62,6 +67,8 @@ struct McapAttachment {
 
 // What one record of a file may have, for a reader need not have more memory.
 inline constexpr std::size_t kMaxChunkBytes = std::size_t{256} << 20;
+// What one message, or one attachment, may have: there is room for the head of its chunk.
+inline constexpr std::size_t kMaxMessageBytes = kMaxChunkBytes - 4'096;
 // What all schemas and channels of a file may take of its memory: it keeps them.
 inline constexpr std::size_t kMaxDeclaredBytes = std::size_t{64} << 20;
 
@@ -84,8 +91,8 @@ struct McapOptions {
 // McapError, and so does each later one. The file then ends with the last chunk that was written
 // whole, as after a kill; or it is deleted (Unfinished::discard). A program that may meet a limit
 // to the size of files must ignore SIGXFSZ. What read_mcap() would not read is refused without such
-// consequences: a message, an attachment, or all schemas and channels together with nearly
-// kMaxChunkBytes.
+// consequences: a message or an attachment of more than kMaxMessageBytes, or more than
+// kMaxDeclaredBytes of schemas and channels.
 class McapWriter {
  public:
   // Makes the file, for its user alone; one that is there already is an error.

@@ -15,6 +15,11 @@
 namespace arbiter::recording {
 namespace {
 
+[[noreturn]] void throw_error(int error, const std::string& text) {
+  if (error == ENOSPC || error == EDQUOT) throw NoRoomError(text);
+  throw McapError(text);
+}
+
 const char* advice_for(int error) {
   switch (error) {
     case ENOSPC:
@@ -37,7 +42,7 @@ OutputFile::OutputFile(const std::string& path, Unfinished unfinished)
   fd_ = ::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
   if (fd_ < 0) {
     const int error = errno;
-    throw McapError("cannot create " + path + ": " + std::strerror(error) + advice_for(error));
+    throw_error(error, "cannot create " + path + ": " + std::strerror(error) + advice_for(error));
   }
 }
 
@@ -51,7 +56,11 @@ void OutputFile::discard() noexcept {
 }
 
 void OutputFile::refuse(const std::string& what, const std::string& reason) const {
-  throw McapError("cannot " + what + " to " + path_ + ": " + reason);
+  throw McapError(text_of(what, reason));
+}
+
+std::string OutputFile::text_of(const std::string& what, const std::string& reason) const {
+  return "cannot " + what + " to " + path_ + ": " + reason;
 }
 
 void OutputFile::require_open(const std::string& what) const {
@@ -71,7 +80,7 @@ void OutputFile::fail(const char* what, int error) {
     ended_ += "; it was deleted";
   }
   ended_ += advice_for(error);
-  refuse(what, ended_);
+  throw_error(error, text_of(what, ended_));
 }
 
 void OutputFile::write(std::string_view bytes) {
@@ -118,8 +127,9 @@ void OutputFile::close() {
   const int fd = std::exchange(fd_, -1);
   // Where the file is another machine's, this is when a quota may be exceeded.
   if (::close(fd) == 0 || errno == EINTR) return;
-  ended_ = std::strerror(errno);
-  refuse("write", ended_);
+  const int error = errno;
+  ended_ = std::strerror(error);
+  throw_error(error, text_of("write", ended_));
 }
 
 }  // namespace arbiter::recording

@@ -11,7 +11,8 @@ namespace arbiter::recording {
 
 class OutputFile {
  public:
-  // Makes it; throws McapError, also where there is one already.
+  // Makes it; throws McapError, also where there is one already. NoRoomError, as write() and
+  // close(), where that is why.
   OutputFile(const std::string& path, Unfinished unfinished);
   ~OutputFile();
   OutputFile(const OutputFile&) = delete;
@@ -34,6 +35,7 @@ class OutputFile {
 
  private:
   void require_open(const std::string& what) const;
+  [[nodiscard]] std::string text_of(const std::string& what, const std::string& reason) const;
   // Says what could not be done, and ends the file.
   [[noreturn]] void fail(const char* what, int error);
   void require_untouched();

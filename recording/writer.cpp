@@ -10,12 +10,6 @@
 #include "recording/summary.hpp"
 
 namespace arbiter::recording {
-namespace {
-
-// There is room for the head of the chunk that it may be in.
-constexpr std::size_t kMostBytes = kMaxChunkBytes - 4'096;
-
-}  // namespace
 
 struct McapWriter::File {
   File(const std::string& path, const McapOptions& chosen)
@@ -28,7 +22,8 @@ struct McapWriter::File {
     return static_cast<std::uint16_t>(count + 1);
   }
 
-  void require_readable(std::size_t bytes, const char* what, std::size_t most = kMostBytes) const {
+  void require_readable(std::size_t bytes, const char* what,
+                        std::size_t most = kMaxMessageBytes) const {
     if (bytes <= most) return;
     out.refuse(std::string("write ") + what, std::to_string(bytes) + " bytes are more than the " +
                                                  std::to_string(most) +
@@ -112,7 +107,7 @@ void McapWriter::write(const McapMessage& message) {
     file_->out.refuse("write", "there is no channel " + std::to_string(message.channel));
   }
   file_->require_readable(message.data.size(), "a message");
-  if (file_->chunk.bytes() + message.data.size() > kMostBytes) file_->end_chunk();
+  if (file_->chunk.bytes() + message.data.size() > kMaxMessageBytes) file_->end_chunk();
   file_->chunk.write(message);
   if (file_->chunk.bytes() >= file_->options.chunk_bytes) file_->end_chunk();
 }

@@ -93,6 +93,12 @@ class Incident {
     if (fate != Fate::none) *masks[static_cast<int>(fate)] = 1;
     add(arrival);
   }
+  // In the last arrival.
+  void put_payload(std::size_t bytes) {
+    auto& arrival = std::get<evidence::Arrival>(records_.back());
+    arrival.size = bytes;
+    arrival.payload.emplace(bytes);
+  }
   void deactivate(const std::string& source, shm::Nanoseconds time, shm::Nanoseconds seen) {
     add(evidence::Deactivation{context(source), time, seen, sequences_[source], generation_});
   }

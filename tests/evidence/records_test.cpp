@@ -262,6 +262,26 @@ TEST(Records, ThatNobodyCouldHaveWrittenAreRefused) {
             ": record 1, of topic arbiter/deactivation: its field \"source\" is not a text");
 }
 
+// A later version may know more reasons.
+TEST(Records, OfWhatIsMissingAreReadWhateverTheReason) {
+  const TemporaryDirectory directory;
+  const auto why_of = [&](const std::string& word) {
+    const std::string file = file_with(
+        directory, "arbiter/missed",
+        R"({"source":"/low","from_ns":1,"to_ns":2,"events":0,"samples":3,"text":"","why":")" +
+            word + "\"}");
+    const auto& missed = std::get<evidence::Missed>(read_all(file).records.at(0));
+    EXPECT_EQ(missed.samples, 3u);
+    return missed.why;
+  };
+  for (const auto why : {evidence::Missed::Why::overtaken, evidence::Missed::Why::queue,
+                         evidence::Missed::Why::refused, evidence::Missed::Why::stranger,
+                         evidence::Missed::Why::too_large, evidence::Missed::Why::memory}) {
+    EXPECT_EQ(why_of(std::string(name_of(why))), why);
+  }
+  EXPECT_EQ(why_of("eaten"), evidence::Missed::Why::other);
+}
+
 // What was typed, for example, may be any bytes.
 TEST(Records, AreReadableWhateverTheirTextsAre) {
   Incident incident;

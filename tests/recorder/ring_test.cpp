@@ -1,6 +1,4 @@
 // A flight recorder's memory, the files that it writes, and who asks for them.
-#include "recorder/ring.hpp"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <signal.h>
@@ -17,8 +15,7 @@
 #include "recorder/dump_socket.hpp"
 #include "recorder/own_files.hpp"
 #include "shm/clock.hpp"
-#include "tests/evidence/incident.hpp"
-#include "tests/recorder/recording.hpp"
+#include "tests/recorder/fed_ring.hpp"
 #include "tests/support/other_user.hpp"
 
 namespace arbiter::test {
@@ -26,44 +23,6 @@ namespace {
 
 using testing::HasSubstr;
 using testing::SizeIs;
-
-// The ring alone, fed with an incident that was made up.
-class RingTest : public testing::Test {
- protected:
-  recorder::RingOptions options(evidence::Nanoseconds span, std::size_t memory) {
-    recorder::RingOptions options;
-    options.span = span;
-    options.memory = memory;
-    options.prefix = directory_.path() + "/flight";
-    options.told = [this](const recorder::Dumped& dumped) {
-      EXPECT_TRUE(fails_ || dumped.error.empty()) << dumped.error;
-      written_.push_back(dumped.file);
-      told_.push_back(dumped);
-    };
-    return options;
-  }
-  // All of it, and a file.
-  evidence::Recorded dump(recorder::Ring& ring, const Incident& incident) {
-    for (const auto& record : incident.records()) {
-      ring.write(std::make_shared<const evidence::Record>(record));
-    }
-    ring.request(recorder::Cause::signal);
-    ring.finish(kEnd);
-    return evidence::load_recording(written_.back());
-  }
-
-  // All that happened before `now` has come.
-  static void tick(recorder::Ring& ring, evidence::Nanoseconds now) { ring.tick(now, kLater); }
-  [[nodiscard]] std::size_t count_of_files() const { return files_in(directory_.path()).size(); }
-
-  static constexpr evidence::Nanoseconds kLater = shm::kForever - 1;
-  static constexpr evidence::Nanoseconds kEnd = 0;  // not known
-  static constexpr evidence::Nanoseconds kSecond = 1'000'000'000;
-  TemporaryDirectory directory_;
-  std::vector<std::string> written_;
-  std::vector<recorder::Dumped> told_;
-  bool fails_ = false;
-};
 
 TEST_F(RingTest, AnswersEachRequestWithItsOwnFile) {
   recorder::Ring ring(options(60 * kSecond, 1 << 20));
@@ -176,6 +135,24 @@ TEST_F(RingTest, KeepsTheLastOfItsOwnFilesAndTouchesNoOthers) {
   EXPECT_EQ(count_of_files(), 3u + 3);  // with the one that was asked for, and two of others
   for (std::size_t i = written_.size() - 3; i < written_.size(); ++i) {
     EXPECT_TRUE(recording::read_mcap(written_[i], {}).is_whole) << written_[i];
+  }
+}
+
+// A robot without a clock of its own boots, and its clock is set once it has a network.
+TEST_F(RingTest, FilesHaveTheWallClockOfTheirOwnTime) {
+  constexpr std::int64_t k2030 = 1'893'456'000 * kSecond;
+  std::int64_t offset = 0;
+  auto settings = options(60 * kSecond, 1 << 20);
+  settings.info.wall_offset = 7;  // as it was when the recorder started
+  settings.wall_offset = [&] { return offset; };
+  recorder::Ring ring(settings);
+  feed(ring, Incident());
+  for (const std::int64_t each : {std::int64_t{0}, k2030}) {
+    offset = each;
+    ring.request(recorder::Cause::asked);
+    tick(ring, kSecond);
+    EXPECT_THAT(written_.back(), HasSubstr(each == 0 ? "/flight-1970" : "/flight-2030"));
+    EXPECT_EQ(evidence::load_recording(written_.back()).about.wall_offset, each);
   }
 }
 
