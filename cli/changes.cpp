@@ -1,12 +1,15 @@
 #include "cli/changes.hpp"
 
+#include <cstdint>
 #include <iostream>
 #include <set>
+#include <string>
 #include <string_view>
 
 #include <nlohmann/json.hpp>
 
 #include "cli/live.hpp"
+#include "rules/text/names.hpp"
 #include "watch/model_in_force.hpp"
 #include "wire/call.hpp"
 #include "wire/document.hpp"
@@ -15,13 +18,19 @@ namespace arbiter::cli {
 namespace {
 
 void write_in_force(const wire::ChangeReport& report) {
-  std::cout << "model " << report.generation.value_or(0) << " is in force\n";
+  const std::uint64_t generation = report.generation.value_or(0);
+  std::cout << (generation == 0 ? "no model" : "model " + std::to_string(generation))
+            << " is in force" << (report.already.value_or(false) ? " already" : "") << '\n';
   if (const auto& past = report.back_to) {
     std::cout << "  it is model " << past->generation << " again: " << past->name;
     for (const auto& file : past->files) std::cout << ' ' << file;
     std::cout << " (" << past->how << ")\n";
   }
   if (report.changes) std::cout << "  " << report.changes->summary << '\n';
+  if (report.policy && report.policy->differs) {
+    std::cout << "the policy " << report.policy->file << " is in force, "
+              << rules::counted(report.policy->rules, "rule") << '\n';
+  }
 }
 
 void add_files(const wire::LoadedModelStatus& model, std::set<std::string>& files) {

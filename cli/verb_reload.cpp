@@ -9,6 +9,7 @@
 #include "cli/changes.hpp"
 #include "cli/live.hpp"
 #include "cli/verbs.hpp"
+#include "rules/text/names.hpp"
 
 namespace arbiter::cli {
 namespace {
@@ -34,6 +35,10 @@ int reload(const ReloadOptions& options) {
   if (!options.dry_run || options.json || !report.ok) return write_result(report, options.json);
   const auto models = report.models.value_or(std::vector<wire::ModelComparison>());
   for (const auto& model : models) write_changes(model, models.size() == 1);
+  if (report.policy && report.policy->differs) {
+    std::cout << "the policy " << report.policy->file << " differs from the one in force: it has "
+              << rules::counted(report.policy->rules, "rule") << '\n';
+  }
   std::cout << "nothing has changed; arbiter reload puts the files in force\n";
   return 0;
 }

@@ -132,8 +132,15 @@ void Daemon::log_end_of(const Client& client, bool is_away) {
               client.description());
     return;
   }
-  log_event(event, log::level::info, "{} left, {} {} with it", client.description(),
-            client.ports.size(), client.ports.size() == 1 ? "port" : "ports");
+  const bool is_dying = client.is_dying();
+  if (event.kind == EventKind::kDied) {
+    log_event(event, log::level::warn, "{} {} with {} open", client.description(),
+              is_dying ? "died" : "is gone", ports_text(event));
+  } else if (!is_dying) {  // else its death follows (Takeover::forget_absentee)
+    const bool is_one = client.ports.size() == 1;
+    log_event(event, log::level::info, "{} is away; its {}{} {} kept for it", client.description(),
+              is_one ? "port " : "", ports_text(event), is_one ? "is" : "are");
+  }
 }
 
 void Daemon::drop(ClientId id) {

@@ -198,7 +198,11 @@ void Daemon::deactivate(Client& client, const wire::Message& message) {
   if (source == nullptr) {
     throw std::runtime_error("no model and no component has named the source " + name);
   }
-  require_free(client, source->open, "the output port " + name);
+  if (const Client* const holder = find_holder(client, source->open)) {
+    throw std::runtime_error("the output port " + name + " is held by " + holder->description() +
+                             ", which alone can end its activity: stop it, or let it call "
+                             "deactivate()");
+  }
   takeover_.require_not_kept(source->away, "the output port " + name);
   require_not_changing(*source);
   if (!source->has_page()) throw std::runtime_error("nobody has the activity of " + name);

@@ -125,8 +125,11 @@ void Daemon::handle(Client& client, wire::Received& received) {
       connect(client, message.request, message.port);
       break;
     case wire::MessageKind::kNodeEnded:
-      // Its own: nothing is kept for it, not even what it asked for and did not wait for.
-      if (message.link == client.node) client.comes_back = false;
+      if (message.link == client.node) {
+        // It ends: nothing is kept for it, not even what it asked for and did not wait for.
+        client.comes_back = false;
+        while (!client.ports.empty()) close_port(client, *client.ports.begin());
+      }
       takeover_.forget_ended(client, message.link);
       break;
     case wire::MessageKind::kStop:
@@ -180,7 +183,7 @@ bool Daemon::change_model(Client& client, const wire::Message& message) {
       ask_for_switch(client, message);
       return true;
     case wire::MessageKind::kRollback:
-      gate_.require(client, Action::kReload);
+      gate_.require_rollback(client);
       changes_.ask({Change::Kind::kRollback, {}, message.link, {}, {}}, client, message);
       return true;
     default:

@@ -103,8 +103,8 @@ void add_refused(const wire::Status& status, Findings& found) {
                 span_text(shm::monotonic_now() - last->at) + " ago: " + last->why,
             "the model mentions " + std::string(ports.size() == 1 ? "that port" : "these ports") +
                 ", and nobody has " + (ports.size() == 1 ? "it" : "them") + " open",
-            "mend that reason, such as by a line in the policy, and start the component again "
-            "unless it asks again by itself");
+            "remove the cause (for example, allow it in the policy), then start the component "
+            "again");
   }
 }
 

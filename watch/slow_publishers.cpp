@@ -5,6 +5,7 @@
 #include <functional>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <thread>
 #include <vector>
@@ -39,8 +40,28 @@ std::optional<shm::Nanoseconds> waits_until(const SourceState& state, shm::Nanos
   return *last + kLongestGap;
 }
 
+// Those that a rule selects or reads: of others it does not matter when they are active.
+std::set<std::string> sources_of_rules(const wire::Status& status) {
+  std::set<std::string> sources;
+  for (const wire::InputStatus& port : status.inputs) {
+    if (!port.arbitrated) continue;
+    for (const auto& connection : port.connections) sources.insert(connection.source);
+    for (const auto& sensed : port.senses) sources.insert(sensed.source);
+  }
+  return sources;
+}
+
 bool may_be_slow(const wire::SourceStatus& source) {
   return source.open && source.timeout != shm::kForever && source.timeout >= kLeastPacedTimeout;
+}
+
+std::vector<const wire::SourceStatus*> sources_that_may_be_slow(const wire::Status& status) {
+  const std::set<std::string> matter = sources_of_rules(status);
+  std::vector<const wire::SourceStatus*> result;
+  for (const wire::SourceStatus& each : status.sources) {
+    if (may_be_slow(each) && matter.contains(each.name)) result.push_back(&each);
+  }
+  return result;
 }
 
 // The sources' paces, once all are known or the time is over.
@@ -118,15 +139,16 @@ void add_gaps(const Port& port, Look& look, const wire::Status& status) {
 Findings examine_publishers(const wire::Caller& caller, const wire::Status& status,
                             const std::function<void()>& while_looking) {
   Findings found;
-  if (std::none_of(status.sources.begin(), status.sources.end(), may_be_slow)) return found;
+  const auto candidates = sources_that_may_be_slow(status);
+  if (candidates.empty()) return found;
   try {
     Instance instance(caller);
     instance.catch_up();
     std::map<shm::SourceId, const wire::SourceStatus*> known;
     std::vector<shm::SourceId> sources;
-    for (const wire::SourceStatus& each : status.sources) {
-      const auto id = may_be_slow(each) ? instance.find_source(each.name) : std::nullopt;
-      if (id && known.emplace(*id, &each).second) sources.push_back(*id);
+    for (const wire::SourceStatus* const each : candidates) {
+      const auto id = instance.find_source(each->name);
+      if (id && known.emplace(*id, each).second) sources.push_back(*id);
     }
     std::sort(sources.begin(), sources.end());
     for (const auto& [source, pace] : watch_paces(instance, sources, while_looking)) {

@@ -19,15 +19,23 @@ void describe(auto& field, Is<ModelComparison> auto& of) {
   field("changes", of.changes);
 }
 
+void describe(auto& field, Is<PolicyComparison> auto& of) {
+  field("file", of.file);
+  field("rules", of.rules);
+  field("differs", of.differs);
+}
+
 void describe(auto& field, Is<ChangeReport> auto& of) {
   field("ok", of.ok);
   field("has_errors", of.has_errors);
   field("text", of.text);
   field.maybe("why", of.why);
   field.maybe("generation", of.generation);
+  field.maybe("already", of.already);
   field.maybe("back_to", of.back_to);
   field.maybe("changes", of.changes);
   field.maybe("models", of.models);
+  field.maybe("policy", of.policy);
 }
 
 ChangeReport read_change_report(std::string_view text) {

@@ -27,6 +27,13 @@ struct ModelComparison {
   std::optional<ModelChanges> changes;  // none: not compared
 };
 
+// The policy, as its file was read.
+struct PolicyComparison {
+  std::string file;  // from the root
+  std::uint64_t rules = 0;
+  bool differs = false;  // from what was in force before
+};
+
 struct ChangeReport {
   bool ok = false;
   bool has_errors = false;         // files have; the text says which
@@ -34,9 +41,11 @@ struct ChangeReport {
   std::optional<std::string> why;  // it is refused
   // Of what is in force now.
   std::optional<std::uint64_t> generation;
+  std::optional<bool> already;                         // of a switch: it was in force before
   std::optional<PastModelStatus> back_to;              // a rollback
   std::optional<ModelChanges> changes;                 // none: not compared
   std::optional<std::vector<ModelComparison>> models;  // of a dry run
+  std::optional<PolicyComparison> policy;              // of a reload and a dry run
 };
 
 // Throws DocumentError.

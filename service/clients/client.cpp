@@ -249,6 +249,11 @@ bool Client::is_process(pid_t pid, int process) const {
 
 bool Client::has_died() const { return has_ended(process_); }
 
+bool Client::is_dying() const {
+  const Headroom::Use use;
+  return is_ending(pid_) || has_died();
+}
+
 std::string Client::description() const {
   return "node \"" + name + "\" (pid " + std::to_string(pid_) + ")";
 }

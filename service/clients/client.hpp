@@ -76,6 +76,8 @@ class Client {
   [[nodiscard]] bool has_hung_up() const { return hung_up_; }
   // Asks the kernel whether the process has ended, which may be known before its socket is closed.
   [[nodiscard]] bool has_died() const;
+  // Or looks whether it is about to have: its socket closes a moment before its end is told.
+  [[nodiscard]] bool is_dying() const;
 
   [[nodiscard]] ClientId id() const { return id_; }
   [[nodiscard]] int socket() const { return socket_.get(); }

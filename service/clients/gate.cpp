@@ -12,6 +12,9 @@
 namespace arbiter::service {
 namespace {
 
+// As long as a refusal is that goes into a message as a whole.
+constexpr std::size_t kMaxAdvised = sizeof(wire::Message::text) - 1;
+
 std::string describe(Action action, std::string_view port) {
   const std::string name(port);
   switch (action) {
@@ -75,23 +78,35 @@ void Gate::put_in_force(const Policy& policy) {
 
 std::optional<std::string> Gate::why_not(const Client& client, Action action,
                                          std::string_view port) const {
-  return why_not(peer_identity(client.socket()), action, port);
+  return why_not(peer_identity(client.socket()), action, port, describe(action, port));
 }
 
-std::optional<std::string> Gate::why_not(const Identity& who, Action action,
-                                         std::string_view port) const {
+std::optional<std::string> Gate::why_not(const Identity& who, Action action, std::string_view port,
+                                         const std::string& deed) const {
   const Policy::Verdict verdict = policy_.may(who, action, port);
   if (verdict.allowed) return {};
-  return "user " + describe_user(who.user) + " may not " + describe(action, port) + ": " +
-         verdict.reason;
+  std::string why = "user " + describe_user(who.user) + " may not " + deed + ": " + verdict.reason;
+  if (!verdict.lacks_line) return why;
+  const std::string line = line_that_allows(name_of_user(who.user), action, port);
+  const std::string advice = "; one that would: " + line;
+  // Half a line could allow something else.
+  if (line.empty() || why.size() + advice.size() > kMaxAdvised) return why;
+  return why + advice;
 }
 
 void Gate::require(const Client& client, Action action, std::string_view port) const {
   if (const auto why = why_not(client, action, port)) throw std::runtime_error(*why);
 }
 
+void Gate::require_rollback(const Client& client) const {
+  const auto why = why_not(peer_identity(client.socket()), Action::kReload, {},
+                           "go back to an earlier model (the policy's action reload)");
+  if (why) throw std::runtime_error(*why);
+}
+
 void Gate::require(const Identity& who, Action action) const {
-  if (const auto why = why_not(who, action, {})) throw std::runtime_error(*why);
+  const auto why = why_not(who, action, {}, describe(action, {}));
+  if (why) throw std::runtime_error(*why);
 }
 
 }  // namespace arbiter::service

@@ -20,18 +20,23 @@ class Gate {
   [[nodiscard]] std::optional<Policy> read(Findings& findings) const;
   void put_in_force(const Policy& policy);
   [[nodiscard]] bool has_file() const { return file_.has_value(); }
+  [[nodiscard]] const Policy& policy() const { return policy_; }
 
   // Empty if the client may do it; else who may not do what, and which line of the policy says so.
   [[nodiscard]] std::optional<std::string> why_not(const Client& client, Action action,
                                                    std::string_view port = {}) const;
   // The same, thrown as std::runtime_error.
   void require(const Client& client, Action action, std::string_view port = {}) const;
+  // To go back to an earlier model, for which there is no action of its own.
+  void require_rollback(const Client& client) const;
   // Of somebody for whom a client asks.
   void require(const Identity& who, Action action) const;
 
  private:
+  // `deed`: in the words of a message.
   [[nodiscard]] std::optional<std::string> why_not(const Identity& who, Action action,
-                                                   std::string_view port) const;
+                                                   std::string_view port,
+                                                   const std::string& deed) const;
 
   std::optional<std::string> file_;
   Policy policy_;

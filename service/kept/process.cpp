@@ -4,24 +4,32 @@
 #include <signal.h>
 
 #include <cerrno>
+#include <filesystem>
 #include <fstream>
-#include <iterator>
 #include <sstream>
 #include <string>
+#include <system_error>
 
 namespace arbiter::service {
 namespace {
+
+// Whoever has more of them, all ended and kept by a debugger, does not hold up who looks.
+constexpr int kMaxThreads = 64;
 
 struct ProcessStatus {
   char state = 0;
   int threads = 0;
   std::uint64_t started = 0;
+  std::uint64_t memory = 0;  // bytes; none after its end
 };
 
-// Fields 3, 20 and 22 of /proc/PID/stat. The 2nd is a name in brackets, of any characters.
-ProcessStatus status_of(pid_t pid) {
-  std::ifstream file("/proc/" + std::to_string(pid) + "/stat");
-  const std::string text{std::istreambuf_iterator<char>(file), {}};
+// Fields 3, 20, 22 and 23 of a file such as /proc/PID/stat. The 2nd is a name in brackets, of any
+// characters.
+ProcessStatus read_status(const std::string& path) {
+  std::ifstream file(path);
+  // A process that ends before it is read is an error of the file, which an iterator would throw.
+  std::string text;
+  std::getline(file, text, '\0');
   const auto name_end = text.rfind(')');
   if (name_end == std::string::npos) return {};
   std::istringstream fields(text.substr(name_end + 1));
@@ -29,9 +37,11 @@ ProcessStatus status_of(pid_t pid) {
   std::string field;
   fields >> status.state;
   for (int i = 4; i <= 19; ++i) fields >> field;
-  fields >> status.threads >> field >> status.started;
+  fields >> status.threads >> field >> status.started >> status.memory;
   return status;
 }
+
+ProcessStatus status_of(pid_t pid) { return read_status("/proc/" + std::to_string(pid) + "/stat"); }
 
 // What has ended stays until its parent asks how; so does a first thread that ended before others.
 bool has_ended(const ProcessStatus& status) {
@@ -53,6 +63,20 @@ bool Process::has_surely_ended() const {
   const ProcessStatus status = status_of(pid);
   if (status.started == 0) return ::kill(pid, 0) != 0 && errno == ESRCH;  // it cannot be read
   return status.started != started || has_ended(status);
+}
+
+bool is_ending(pid_t pid) {
+  if (pid <= 0) return false;
+  std::error_code error;
+  std::filesystem::directory_iterator thread("/proc/" + std::to_string(pid) + "/task", error);
+  int looked_at = 0;
+  for (; !error && thread != std::filesystem::directory_iterator(); thread.increment(error)) {
+    const ProcessStatus status = read_status(thread->path().string() + "/stat");
+    const bool has_gone = status.state == 0 && !std::filesystem::exists(thread->path(), error);
+    const bool may_go_on = status.state == 0 ? !has_gone : status.memory != 0;
+    if (may_go_on || ++looked_at > kMaxThreads) return false;
+  }
+  return looked_at != 0 && !error;
 }
 
 bool has_ended(const shm::FileDescriptor& process) {

@@ -24,4 +24,8 @@ std::uint64_t start_of_process(pid_t pid);
 // Whether the process of a pidfd has ended.
 [[nodiscard]] bool has_ended(const shm::FileDescriptor& process);
 
+// Whether a process is past its last instruction: no thread of it has memory any longer. It closes
+// its sockets before its pidfd tells of its end. False where that cannot be told, too.
+[[nodiscard]] bool is_ending(pid_t pid);
+
 }  // namespace arbiter::service

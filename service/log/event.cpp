@@ -1,5 +1,7 @@
 #include "service/log/event.hpp"
 
+#include "rules/text/names.hpp"
+
 namespace arbiter::service {
 namespace {
 
@@ -30,6 +32,12 @@ const std::array<EventName, kEventKinds> event_names{{
     {EventKind::kRolledBack, "rolled-back", "9c297ce3d5a4409db74d0d72ba498835"},
     {EventKind::kChangeRefused, "change-refused", "810b4dbd5ff6480c95704ce6f7da73f1"},
 }};
+
+std::string ports_text(const Event& event) {
+  const std::size_t count = event.sources.size() + event.ports.size();
+  if (count != 1) return rules::counted(count, "port");
+  return std::string(event.sources.empty() ? event.ports.front() : event.sources.front());
+}
 
 EventScope::EventScope(const Event& event) noexcept : outer_(std::exchange(in_hand, &event)) {}
 

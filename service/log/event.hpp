@@ -7,6 +7,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
@@ -55,6 +56,9 @@ struct Event {
   std::vector<std::string_view> ports{};       // input ports
   std::uint64_t generation = 0;                // of a model; 0: it is about none
 };
+
+// For the text of a line: its one port, or how many ports it names: "/Arm/pos:i", "3 ports".
+[[nodiscard]] std::string ports_text(const Event& event);
 
 // While it lives, what this thread logs is about that event.
 class EventScope {

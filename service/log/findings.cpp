@@ -44,6 +44,7 @@ bool is_error(const rules::Diagnostic& finding) {
 }  // namespace
 
 void Findings::add(std::string of, rules::Diagnostics diagnostics) {
+  had_errors_ |= diagnostics.has_errors();
   if (takes_warnings_for_errors_) diagnostics.make_warnings_errors();
   log_findings(of, diagnostics);
   const auto part =
@@ -54,6 +55,7 @@ void Findings::add(std::string of, rules::Diagnostics diagnostics) {
 
 void Findings::add_failure(std::string why) {
   log::error("{}", why);
+  had_errors_ = true;
   failures_.push_back(std::move(why));
 }
 
@@ -61,6 +63,11 @@ bool Findings::has_errors() const {
   return !failures_.empty() || std::any_of(parts_.begin(), parts_.end(), [](const Part& part) {
     return part.diagnostics.has_errors();
   });
+}
+
+std::string Findings::why_refused() const {
+  return std::string("the files have errors, listed above") +
+         (had_errors_ ? "" : "; --strict treats warnings as errors");
 }
 
 std::string Findings::first_error() const {

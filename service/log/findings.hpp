@@ -26,6 +26,8 @@ class Findings {
   void add_failure(std::string why);
 
   [[nodiscard]] bool has_errors() const;
+  // "the files have errors, listed above", and that it is for warnings alone, where it is.
+  [[nodiscard]] std::string why_refused() const;
   // "the model has errors: file:line:column: message", of the first error, and how many more there
   // are.
   [[nodiscard]] std::string first_error() const;
@@ -40,6 +42,7 @@ class Findings {
     rules::Diagnostics diagnostics;
   };
   bool takes_warnings_for_errors_;
+  bool had_errors_ = false;  // before warnings became errors
   std::vector<std::string> failures_;
   std::vector<Part> parts_;
 };

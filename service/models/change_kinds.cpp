@@ -51,8 +51,7 @@ void ModelChanges::read_first(int stop_descriptor, const std::function<bool()>& 
   }
   Reading reading = compiler_.take();
   if (reading.findings.has_errors()) {
-    not_read_at_start_ = std::string("the files have errors, listed above") +
-                         (options_.is_strict ? "; --strict treats warnings as errors" : "");
+    not_read_at_start_ = reading.findings.why_refused();
     const bool lacks_policy = gate_.has_file() && !reading.policy;
     if (lacks_policy || !may_inherit) throw BadModel("not started: " + not_read_at_start_);
     reading.models.clear();
@@ -91,10 +90,16 @@ void ModelChanges::prepare_reload(Swap& swap) {
           }));
 }
 
+bool ModelChanges::changes_policy(const std::optional<Policy>& policy) const {
+  return policy && !policy->has_rules_of(gate_.policy());
+}
+
 // Throws; then nothing has changed, and `swap` knows the findings.
 void ModelChanges::finish_reload(Swap& swap, Reading reading) {
+  swap.policy = std::move(reading.policy);
+  swap.changes_policy = changes_policy(swap.policy);
   if (options_.files.empty()) {
-    gate_.put_in_force(*reading.policy);
+    gate_.put_in_force(*swap.policy);
     answer_done(swap, nullptr);
     return;
   }
@@ -106,7 +111,6 @@ void ModelChanges::finish_reload(Swap& swap, Reading reading) {
   swap.changes = std::move(reading.changes);
   swap.content = content_of(*next);
   reserve_tables(library);
-  swap.policy = std::move(reading.policy);
   swap.library = std::move(library);
   begin_swap(swap);
 }
@@ -146,6 +150,7 @@ const LoadedModel& ModelChanges::loaded_model(const std::string& name) const {
 void ModelChanges::prepare_switch(Swap& swap) {
   const LoadedModel& next = loaded_model(swap.change.name);
   if (next.model == in_force_.model) {
+    swap.is_in_force_already = true;
     answer_done(swap, nullptr);
     return;
   }
@@ -241,7 +246,9 @@ void ModelChanges::finish_comparison(const Swap& swap, const Reading& reading) {
                       {"in_force", name == board_.name()},
                       {"changes", nlohmann::json::parse(reading.diffs[i])}});
   }
-  answer(swap, {{"ok", true}, {"models", std::move(models)}});
+  answer(swap, {{"ok", true},
+                {"models", std::move(models)},
+                {"policy", policy_json(reading.policy, changes_policy(reading.policy))}});
 }
 
 }  // namespace arbiter::service

@@ -124,8 +124,8 @@ void ModelChanges::attempt(Swap& swap, const std::function<void()>& step) {
   } catch (const std::exception& error) {
     if (swap.change.kind == Change::Kind::kReload) ++reloads_refused_;
     // What is found in files is in the log when they have been read.
-    const char* const why =
-        swap.findings.has_errors() ? "the files have errors, listed above" : error.what();
+    const std::string why =
+        swap.findings.has_errors() ? swap.findings.why_refused() : std::string(error.what());
     if (swap.change.kind == Change::Kind::kCompare) {
       log::info("{} asks what a reload would do: {}", swap.change.by, why);
     } else {
@@ -242,10 +242,17 @@ const shm::FileDescriptor& ModelChanges::document() {
   return document_.of({board_, library_, in_force_.model, history_, continuity_});
 }
 
+nlohmann::json ModelChanges::policy_json(const std::optional<Policy>& policy, bool differs) {
+  if (!policy) return nullptr;
+  return {{"file", policy->path()}, {"rules", policy->size()}, {"differs", differs}};
+}
+
 void ModelChanges::answer_done(const Swap& swap, nlohmann::json changes) {
   answer(swap, {{"ok", true},
                 {"generation", board_.in_force().generation},
                 {"name", board_.name()},
+                {"already", swap.is_in_force_already},
+                {"policy", policy_json(swap.policy, swap.changes_policy)},
                 {"back_to", swap.back_to ? to_json(*swap.back_to) : nullptr},
                 {"changes", std::move(changes)}});
 }

@@ -106,6 +106,8 @@ class ModelChanges {
 
   void prepare_reload(Swap& swap);
   void finish_reload(Swap& swap, Reading reading);
+  // Whether it has other rules than the one in force.
+  [[nodiscard]] bool changes_policy(const std::optional<Policy>& policy) const;
   void prepare_switch(Swap& swap);
   [[nodiscard]] const LoadedModel& loaded_model(const std::string& name) const;
   void prepare_rollback(Swap& swap);
@@ -121,6 +123,9 @@ class ModelChanges {
   void settle();
   void remember(const Swap& swap, std::uint64_t generation);
 
+  // Of the report on a change: the policy that was read with it, if there is one.
+  [[nodiscard]] static nlohmann::json policy_json(const std::optional<Policy>& policy,
+                                                  bool differs);
   void answer_done(const Swap& swap, nlohmann::json changes);
   void answer_refused(const Swap& swap, const std::string& why);
   // `why_not`: of what was refused.

@@ -26,6 +26,9 @@ struct Swap {
   // Of a reload: what else changes with it.
   std::optional<Library> library{};
   std::optional<Policy> policy{};
+  bool changes_policy = false;  // it has other rules than the one before
+  // Of a switch: to what is in force.
+  bool is_in_force_already = false;
 };
 
 }  // namespace arbiter::service

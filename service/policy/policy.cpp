@@ -72,7 +72,13 @@ Policy::Verdict Policy::may(const Identity& who, Action action, std::string_view
             "the default policy allows it to root and to the daemon's own user alone; "
             "arbiterd --policy takes another one"};
   }
-  return {false, "no line of " + path_ + " allows it"};
+  return {false, "no line of " + path_ + " allows it", true};
+}
+
+bool Policy::has_rules_of(const Policy& other) const {
+  return owner_ == other.owner_ &&
+         std::equal(rules_.begin(), rules_.end(), other.rules_.begin(), other.rules_.end(),
+                    [](const Rule& one, const Rule& another) { return one.decides_as(another); });
 }
 
 std::vector<Policy::Pattern> Policy::patterns() const {

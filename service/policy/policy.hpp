@@ -52,6 +52,10 @@ struct Accounts {
 };
 Accounts accounts_of_this_machine();
 
+// A line that would allow it to the user of that name or number; empty: no pattern names this port
+// alone.
+std::string line_that_allows(const std::string& user, Action action, std::string_view port);
+
 // The action of that name that is about no port, such as "observe"; nothing: there is none.
 std::optional<Action> action_on_no_port(std::string_view name);
 
@@ -59,7 +63,8 @@ class Policy {
  public:
   struct Verdict {
     bool allowed = false;
-    std::string reason;  // names the line that decided
+    std::string reason;       // names the line that decided
+    bool lacks_line = false;  // none of a file's decides, and one could allow it
   };
 
   // One of those that a line names, as the ports that its actions are about.
@@ -83,6 +88,10 @@ class Policy {
   [[nodiscard]] Verdict may(const Identity& who, Action action, std::string_view port = {}) const;
 
   [[nodiscard]] std::size_t size() const { return rules_.size(); }
+  // From the root; empty: it is the default.
+  [[nodiscard]] const std::string& path() const { return path_; }
+  // Whether both have the same rules, whatever else stands in their files.
+  [[nodiscard]] bool has_rules_of(const Policy& other) const;
   // As long as this lives.
   [[nodiscard]] std::vector<Pattern> patterns() const;
 
@@ -108,6 +117,10 @@ class Policy {
     std::optional<rules::Location> where;  // of the glob; nothing: there is none
 
     [[nodiscard]] bool covers(const Rule& later) const;
+    [[nodiscard]] bool decides_as(const Rule& other) const {
+      return allows == other.allows && who == other.who && actions == other.actions &&
+             glob == other.glob;
+    }
   };
 
   std::string path_;  // empty: the default

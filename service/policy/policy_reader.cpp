@@ -5,6 +5,8 @@
 #include <array>
 #include <cerrno>
 #include <charconv>
+#include <filesystem>
+#include <system_error>
 #include <utility>
 
 #include "rules/text/names.hpp"
@@ -63,6 +65,17 @@ std::optional<Entry> look_up(Function function, const std::string& name) {
 
 }  // namespace
 
+std::string line_that_allows(const std::string& user, Action action, std::string_view port) {
+  for (const NamedAction& each : kActions) {
+    if (each.action != action) continue;
+    std::string line = "allow user " + user + ' ' + std::string(each.name);
+    if (!each.on_ports) return line;
+    if (port.find('*') != std::string_view::npos) return {};
+    return line + ' ' + std::string(port);
+  }
+  return {};
+}
+
 std::optional<Action> action_on_no_port(std::string_view name) {
   for (const NamedAction& each : kActions) {
     if (each.name == name && !each.on_ports) return each.action;
@@ -86,7 +99,9 @@ class PolicyReader {
   PolicyReader(const rules::TextFile& file, uid_t owner, const Accounts& accounts,
                rules::Diagnostics& diagnostics)
       : file_(file), accounts_(accounts), diagnostics_(diagnostics), policy_(owner) {
-    policy_.path_ = file.path();
+    std::error_code error;  // where it is not known, the path stays as it was given
+    policy_.path_ = std::filesystem::absolute(file.path(), error).lexically_normal().string();
+    if (error) policy_.path_ = file.path();
     policy_.rules_.clear();
   }
 

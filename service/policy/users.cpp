@@ -17,7 +17,7 @@ namespace arbiter::service {
 
 // The name is that of /etc/passwd. A name service may ask a network that is not there, and take
 // half a minute: all clients would wait because one was refused.
-std::string describe_user(uid_t user) {
+std::string name_of_user(uid_t user) {
   const std::unique_ptr<FILE, int (*)(FILE*)> accounts(
       std::fopen("/etc/passwd", "re"), [](FILE* file) { return std::fclose(file); });
   passwd entry{};
@@ -25,9 +25,15 @@ std::string describe_user(uid_t user) {
   std::array<char, 4096> buffer;
   while (accounts != nullptr &&
          fgetpwent_r(accounts.get(), &entry, buffer.data(), buffer.size(), &found) == 0) {
-    if (entry.pw_uid == user) return entry.pw_name + (" (" + std::to_string(user) + ")");
+    if (entry.pw_uid == user) return entry.pw_name;
   }
   return std::to_string(user);
+}
+
+std::string describe_user(uid_t user) {
+  const std::string number = std::to_string(user);
+  const std::string name = name_of_user(user);
+  return name == number ? number : name + " (" + number + ")";
 }
 
 Identity peer_identity(int socket) {

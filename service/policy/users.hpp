@@ -17,6 +17,8 @@ Identity peer_identity(int socket);
 // Of a user whose groups are such a text: numbers between single blanks. Throws std::runtime_error.
 Identity identity_of(uid_t user, std::string_view groups);
 
+// "nobody"; the number where it has no name.
+std::string name_of_user(uid_t user);
 // "nobody (65534)"; the number alone where it has no name.
 std::string describe_user(uid_t user);
 

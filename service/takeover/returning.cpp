@@ -202,8 +202,11 @@ void Takeover::log_end_of(const Absentee& absentee) {
     if (absentee.ports.contains(input->away)) event.ports.push_back(input->name);
   }
   deaths_.note(event, absentee.pid, absentee.user.value_or(0));
-  log_event(event, log::level::info, "process {} has ended, {} {} with it", absentee.pid,
-            absentee.ports.size(), absentee.ports.size() == 1 ? "port" : "ports");
+  const std::string pid = std::to_string(absentee.pid);
+  log_event(
+      event, log::level::warn, "{} died with {} open",
+      absentee.name.empty() ? "process " + pid : "node \"" + absentee.name + "\" (pid " + pid + ")",
+      ports_text(event));
 }
 
 void Takeover::forget_absentee(NodeId node) {

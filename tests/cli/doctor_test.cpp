@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "tests/cli/arbiter_program.hpp"
+#include "tests/support/await.hpp"
 #include "tests/support/daemon.hpp"
 
 namespace arbiter::test {
@@ -84,10 +85,13 @@ TEST(DoctorProgram, SaysThatNoDaemonRunsOnTheMachineOfAnEmptyRoot) {
 // 250 ms is more than its T.
 TEST(DoctorProgram, SaysWhichPublisherIsSlowerThanItsT) {
   Daemon daemon(R"(<behaviors timeout="1s"><source port="/slow" timeout="100ms"/>
+    <source port="/unread" timeout="100ms"/>
     <behavior name="A"><config at="/p">/slow</config></behavior>
     <behavior name="B"><config at="/q">/quick</config></behavior></behaviors>)");
   const ChildProcess slow({ARBITER_PROGRAMS "/arbiter", "pub", "/slow", "--rate", "4"}, {}, {});
   const ChildProcess quick({ARBITER_PROGRAMS "/arbiter", "pub", "/quick", "--rate", "20"}, {}, {});
+  const ChildProcess unread({ARBITER_PROGRAMS "/arbiter", "pub", "/unread", "--rate", "4"}, {}, {});
+  await([&] { return daemon.source("/unread")["open"] == true; });
   std::string out;
   // Where the machine is busy, two periods may differ too much.
   while (out.find("[slow-publisher]") == std::string::npos) {
@@ -97,6 +101,7 @@ TEST(DoctorProgram, SaysWhichPublisherIsSlowerThanItsT) {
   EXPECT_THAT(out, HasSubstr("(arbiter-pub, pid " + std::to_string(slow.pid()) + ")"));
   EXPECT_THAT(out, HasSubstr("<source port=\"/slow\" timeout="));
   EXPECT_THAT(out, testing::Not(HasSubstr("/quick publishes")));
+  EXPECT_THAT(out, testing::Not(HasSubstr("/unread publishes"))) << "no rule reads or selects it";
 }
 
 TEST(DoctorProgram, RefusesWhatItCannotLookAt) {

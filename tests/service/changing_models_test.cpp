@@ -29,6 +29,8 @@ TEST_F(ChangingModels, SwitchGoesToAnotherModelAndListsAll) {
   expect_success(arbiter({"switch"}), "* " + default_files + "  " + other_files);
   expect_success(arbiter({"switch", "other"}), "model 2 is in force\n");
   EXPECT_EQ(source_in_force(), "/b");
+  expect_success(arbiter({"switch", "other"}), "model 2 is in force already\n");
+  EXPECT_EQ(nlohmann::json::parse(arbiter({"switch", "other", "--json"}).out)["already"], true);
   expect_success(arbiter({"switch"}), "  " + default_files + "* " + other_files);
   EXPECT_THAT(arbiter({"status"}).out, HasSubstr(", model 2 other " + files_.path()));
   expect_refusal(arbiter({"switch", "third"}),

@@ -3,10 +3,12 @@
 #include <gtest/gtest.h>
 #include <poll.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include <filesystem>
 
 #include <arbiter/arbiter.hpp>
+#include <nlohmann/json.hpp>
 
 #include "tests/support/daemon.hpp"
 #include "tests/support/other_user.hpp"
@@ -66,8 +68,42 @@ TEST(Control, ReloadReadsAPolicyWhereThereIsNoModel) {
   Node node("component");
   EXPECT_THROW({ auto in = node.input_port<int>("/in"); }, Error);
   files.write("policy", "allow everyone input *\n");
-  EXPECT_EQ(arbiter({"reload"}).exit_code, 0);
+  const auto result = arbiter({"reload"});
+  EXPECT_EQ(result.exit_code, 0);
+  EXPECT_EQ(result.out, "no model is in force\nthe policy " + policy + " is in force, 1 rule\n");
   auto in = node.input_port<int>("/in");
+}
+
+TEST(Control, ReloadTellsOfThePolicyIfItsRulesHaveChanged) {
+  const TemporaryDirectory files;
+  const auto policy = files.write("policy", "allow everyone all\n");
+  Daemon daemon(model_from("/a"), {.arguments = {"--policy", policy}});
+  const std::string same = "  no difference: 1 port decides alike in every state\n";
+  files.write("policy", "# as it was\nallow everyone all\n");
+  EXPECT_EQ(arbiter({"reload"}).out, "model 2 is in force\n" + same);
+  files.write("policy", "deny everyone stop\nallow everyone all\n");
+  EXPECT_THAT(arbiter({"reload", "--dry-run"}).out,
+              HasSubstr("the policy " + policy +
+                        " differs from the one in force: it has 2 rules\nnothing has changed"));
+  const auto report = nlohmann::json::parse(arbiter({"reload", "--dry-run", "--json"}).out);
+  EXPECT_EQ(report["policy"], (nlohmann::json{{"file", policy}, {"rules", 2}, {"differs", true}}));
+  EXPECT_EQ(arbiter({"reload"}).out,
+            "model 3 is in force\n" + same + "the policy " + policy + " is in force, 2 rules\n");
+  EXPECT_THAT(arbiter({"reload", "--dry-run"}).out, Not(HasSubstr("policy")));
+  EXPECT_EQ(nlohmann::json::parse(arbiter({"reload", "--json"}).out)["policy"]["differs"], false);
+  EXPECT_EQ(nlohmann::json::parse(arbiter({"rollback", "1", "--json"}).out)["policy"], nullptr);
+}
+
+TEST(Control, DeactivateSaysWhoAloneEndsTheActivityOfAnOpenSource) {
+  Daemon daemon(model_from("/a"));
+  Node node("component");
+  auto out = node.output_port<int>("/a");
+  const auto result = arbiter({"deactivate", "/a"});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_EQ(result.err, "arbiter: the output port /a is held by node \"component\" (pid " +
+                            std::to_string(::getpid()) +
+                            "), which alone can end its activity: stop it, or let it call "
+                            "deactivate()\n");
 }
 
 // Nobody writes to it: a daemon that opened it would not even end when it is told to.

@@ -116,6 +116,15 @@ TEST(Process, WhoseFirstThreadHasEndedLives) {
   const Process process{child.pid(), start_of_process(child.pid())};
   test::await([&] { return state_of(child.pid()) == 'Z'; });
   EXPECT_TRUE(process.lives());
+  EXPECT_FALSE(is_ending(child.pid())) << "another thread goes on";
+}
+
+TEST(Process, ThatHasNoMemoryIsEnding) {
+  Child child;
+  EXPECT_FALSE(is_ending(child.pid()));
+  child.let_go();
+  EXPECT_TRUE(is_ending(child.pid()));
+  EXPECT_FALSE(is_ending(0)) << "it cannot be told";
 }
 
 }  // namespace

@@ -1,5 +1,6 @@
 // A daemon takes over when a component has no port left, or has ended while there was no daemon.
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <chrono>
@@ -159,6 +160,22 @@ TEST(Takeover, OfMoreNodesThanAnyoneCountsAllPortsAreFreed) {
   ended.clear();
   daemon.restart();
   await([&] { return !keeps_any(daemon); });
+}
+
+// What the socket had no room for is not told as a death.
+TEST(EndedNode, HasLeftInGoodOrderThoughItsPortsWereOpen) {
+  Daemon daemon(single_model());
+  {
+    Node ended("ended", without_thread());
+    daemon.process().stop();
+    EXPECT_THROW(static_cast<void>(ended.output_port<Number>("/out")), Error);
+    daemon.process().resume();
+    await([&] { return daemon.source("/out")["open"] == true; });
+  }
+  await([&] { return daemon.source("/out")["open"] == false; });
+  const std::string left = "node \"ended\" (pid " + std::to_string(getpid()) + ") left\n";
+  await([&] { return daemon.log().find(left) != std::string::npos; });
+  EXPECT_TRUE(daemon.status()["deaths"].empty());
 }
 
 // Nobody else of its process says anything meanwhile.

@@ -21,6 +21,7 @@
 #include "tests/client/samples.hpp"
 #include "tests/support/daemon.hpp"
 #include "tests/support/journal_socket.hpp"
+#include "tests/support/raw_port.hpp"
 #include "tests/support/text_files.hpp"
 
 namespace arbiter::service {
@@ -281,6 +282,64 @@ TEST(Journal, HasTheDeathOfAComponentUnderThePortsThatItHad) {
   component.kill();
   const JournalRecord died = journal.wait_for("died", about({{"ARBITER_SOURCE", "/out"}}));
   EXPECT_THAT(died, IsSupersetOf(about({{"ARBITER_COMPONENT", "victim"}})));
+}
+
+// A process closes its socket a moment before the kernel says that it has ended: the last word of
+// it is that it has died, and never that it is away.
+TEST(Journal, HasEachDeathOnceAndNobodyAwayWhoHasDied) {
+  const TemporaryDirectory directory;
+  JournalServer journal(directory.path() + "/journal");
+  const ScopedVariable socket("ARBITER_JOURNAL_SOCKET", journal.path());
+  Daemon daemon(rules(arbiter_at("/in", select("/out"))), {.by = kAsService});
+  std::multiset<std::string> expected, told;
+  const auto note_end = [&](const JournalRecord& record) {
+    const std::string event =
+        record.contains("ARBITER_EVENT") ? record.find("ARBITER_EVENT")->second : std::string();
+    if (event != "away" && event != "died" && event != "left") return false;
+    told.insert(record.find("PRIORITY")->second + ' ' + event + ": " +
+                record.find("MESSAGE")->second);
+    return event == "died";
+  };
+  for (int i = 0; i < 20; ++i) {
+    Component component("victim");
+    ASSERT_EQ(component.tell("output /out"), "open");
+    const bool has_two = i % 2 != 0;
+    if (has_two) {
+      ASSERT_EQ(component.tell("input /in"), "open");
+    }
+    expected.insert("4 died: node \"victim\" (pid " + std::to_string(component.process().pid()) +
+                    ") died with " + (has_two ? "2 ports" : "/out") + " open");
+    component.kill();
+    while (!note_end(journal.receive())) {
+    }
+  }
+  EXPECT_EQ(daemon.terminate(), 0);
+  for (const JournalRecord& record : journal.rest()) note_end(record);
+  EXPECT_EQ(told, expected);
+}
+
+// Its process goes on, and may come back.
+TEST(Journal, SaysOfWhoeverIsAwayThatItsPortsAreKept) {
+  const TemporaryDirectory directory;
+  JournalServer journal(directory.path() + "/journal");
+  const ScopedVariable socket("ARBITER_JOURNAL_SOCKET", journal.path());
+  Daemon daemon(rules(arbiter_at("/in", select("/out"))), {.by = kAsService});
+  const std::string pid = std::to_string(::getpid());
+  const auto hang_up = [&](const std::string& name, const std::vector<std::string>& ports) {
+    RawClient client(daemon.instance());
+    client.hello(name, wire::kComesBack);
+    for (const std::string& port : ports) open_raw_output(client, port, raw_output_segment());
+  };
+  const auto text_of = [&](const std::string& name) {
+    const JournalRecord record = journal.wait_for("away", about({{"ARBITER_COMPONENT", name}}));
+    return record.find("PRIORITY")->second + ' ' + record.find("MESSAGE")->second;
+  };
+  hang_up("one", {"/out"});
+  EXPECT_EQ(text_of("one"),
+            "6 node \"one\" (pid " + pid + ") is away; its port /out is kept for it");
+  hang_up("two", {"/a", "/b"});
+  EXPECT_EQ(text_of("two"),
+            "6 node \"two\" (pid " + pid + ") is away; its 2 ports are kept for it");
 }
 
 TEST(Journal, IsNotTakenForOneWithoutTheServiceManagersWord) {

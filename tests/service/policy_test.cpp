@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <filesystem>
 #include <sstream>
 
 #include "service/policy/unmatched.hpp"
@@ -30,6 +31,9 @@ const Accounts kAccounts{[](const std::string& name) -> std::optional<uid_t> {
                            if (name == "guests") return kGuests;
                            return {};
                          }};
+
+// Whoever is refused does not know in which directory the daemon was given its files.
+const std::string kPath = std::filesystem::current_path().string() + "/policy";
 
 const Identity kRoot{0, {0}};
 const Identity kTheOwner{kOwner, {kOwner}};
@@ -136,8 +140,43 @@ TEST(Policy, SeveralActionsAndPatternsStandOnOneLine) {
 TEST(Policy, TellsTheLineThatRefuses) {
   const Policy policy = good("# the arm\n\n  deny   everyone\toutput /Arm/* /Leg/* # not yours\n");
   EXPECT_EQ(policy.may(kOther, Action::kOutput, "/Leg/x").reason,
-            "policy:3 says: deny everyone output /Arm/* /Leg/*");
-  EXPECT_EQ(policy.may(kOther, Action::kStop).reason, "no line of policy allows it");
+            kPath + ":3 says: deny everyone output /Arm/* /Leg/*");
+  EXPECT_EQ(policy.may(kOther, Action::kStop).reason, "no line of " + kPath + " allows it");
+}
+
+TEST(Policy, SaysWhereALineIsMissingThatWouldAllowIt) {
+  const std::vector<std::pair<std::string, Action>> actions{
+      {"output /x:o", Action::kOutput},
+      {"input /x:o", Action::kInput},
+      {"deactivate /x:o", Action::kDeactivate},
+      {"observe", Action::kObserve},
+      {"reload", Action::kReload},
+      {"switch", Action::kSwitch},
+      {"stop", Action::kStop},
+      {"replay /x:o", Action::kReplay},
+      {"tap /x:o", Action::kTap}};
+  const std::string others = "allow user alice all\n";
+  for (const auto& [text, action] : actions) {
+    EXPECT_TRUE(good(others).may(kOther, action, "/x:o").lacks_line) << text;
+    const std::string line = line_that_allows("bob", action, "/x:o");
+    EXPECT_EQ(line, "allow user bob " + text);
+    EXPECT_TRUE(may(good(others + line), kOther, action, "/x:o")) << line;
+  }
+  EXPECT_EQ(line_that_allows("bob", Action::kTap, "/x*"), "") << "it would allow others, too";
+  EXPECT_FALSE(good("deny everyone stop").may(kOther, Action::kStop).lacks_line);
+  EXPECT_FALSE(Policy(kOwner).may(kOther, Action::kStop).lacks_line) << "there is no file";
+}
+
+TEST(Policy, IsTheSameWhereItsRulesAre) {
+  const Policy policy = good("allow user alice output,input /a:o\n");
+  EXPECT_TRUE(policy.has_rules_of(good("# hers\n\nallow  user 1000 output,input /a:o # late\n")));
+  for (const std::string other :
+       {"deny user alice output,input /a:o", "allow user bob output,input /a:o",
+        "allow user alice output /a:o", "allow user alice output,input /a:o /b:o",
+        "allow user alice output,input /b:o"}) {
+    EXPECT_FALSE(policy.has_rules_of(good(other))) << other;
+    EXPECT_FALSE(good(other).has_rules_of(policy)) << other;
+  }
 }
 
 TEST(Policy, WithoutAFileEveryoneMayOpenPortsAndObserve) {

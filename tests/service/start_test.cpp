@@ -88,6 +88,29 @@ TEST(Start, ChecksItsFilesAndEndsIfThatIsAllItIsToDo) {
       << refused.err;
 }
 
+// Who is told of warnings looks for one.
+TEST(Start, SpeaksOfStrictnessOnlyWhereWarningsAreAllThatIsWrong) {
+  const TemporaryDirectory directory;
+  const std::string strictness = "; --strict treats warnings as errors";
+  const auto model =
+      directory.write("model.xml", "<behaviors><source port='/unread'/></behaviors>");
+  const auto warned = arbiterd({"--check", "--strict", "--model", model});
+  EXPECT_EQ(warned.exit_code, 1);
+  EXPECT_NE(warned.err.find("the files have errors, listed above" + strictness), std::string::npos)
+      << warned.err;
+  const std::vector<std::string> without_policy{"--strict", "--policy",
+                                                directory.path() + "/nowhere"};
+  std::vector<std::string> check = without_policy;
+  check.emplace_back("--check");
+  const auto refused = arbiterd(check);
+  EXPECT_EQ(refused.exit_code, 1);
+  EXPECT_NE(refused.err.find("the files have errors, listed above\n"), std::string::npos)
+      << refused.err;
+  const auto [code, log] = start_in_vain(without_policy, {{"RUNTIME_DIRECTORY", directory.path()}});
+  EXPECT_EQ(code, 1);
+  EXPECT_NE(log.find("the files have errors, listed above\n"), std::string::npos) << log;
+}
+
 TEST(Start, SaysWhichOptionItDoesNotKnowAndWhatWasMeant) {
   const auto result = arbiterd({"--modle", "x"});
   EXPECT_EQ(result.exit_code, 2);

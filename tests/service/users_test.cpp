@@ -78,9 +78,12 @@ TEST_F(Users, OpenThePortsThatTheirNameAllows) {
   start("allow user nobody output /Arm/*\nallow user 54321 input /Arm/in\n");
   EXPECT_EQ(open_output(kNobody, "/Arm/out"), "opened");
   EXPECT_EQ(open_input(kStranger, "/Arm/in"), "opened");
-  EXPECT_THAT(open_output(kStranger, "/Arm/out"),
-              HasSubstr("user 54321 may not open the output port /Arm/out: no line of " +
-                        policy_path() + " allows it"));
+  EXPECT_THAT(
+      open_output(kStranger, "/Arm/out"),
+      HasSubstr("user 54321 may not open the output port /Arm/out: no line of " + policy_path() +
+                " allows it; one that would: allow user 54321 output /Arm/out"));
+  EXPECT_THAT(open_input(kNobody, "/Arm/in"),
+              HasSubstr(" allows it; one that would: allow user nobody input /Arm/in"));
   EXPECT_THAT(open_input(kNobody, "/Arm/in"),
               HasSubstr("user nobody (65534) may not open the input port /Arm/in: "));
   EXPECT_THAT(open_output(kNobody, "/Leg/out"), HasSubstr("may not"));
@@ -140,7 +143,10 @@ TEST_F(Users, ReloadStopDeactivateAndObserveAsThePolicySays) {
   EXPECT_THAT(ask(kNobody, MessageKind::kSwitch, "default"),
               HasSubstr("may not switch to another model"))
       << "reload does not imply it";
-  EXPECT_THAT(ask(kStranger, MessageKind::kRollback), HasSubstr("may not reload the files"));
+  EXPECT_EQ(ask(kStranger, MessageKind::kRollback),
+            "user 54321 may not go back to an earlier model (the policy's action reload): no line "
+            "of " +
+                policy_path() + " allows it; one that would: allow user 54321 reload");
   for (const MessageKind kind :
        {MessageKind::kReload, MessageKind::kStatus, MessageKind::kObserve}) {
     EXPECT_THAT(ask(kStranger, kind), StartsWith("user 54321 may not "));

@@ -91,6 +91,9 @@ TEST(DoctorPorts, FindsPortsThatWereRefused) {
   ASSERT_THAT(codes_of(found), ElementsAre("opening-refused"));
   EXPECT_THAT(found[0].what, AllOf(HasSubstr("gateway (pid 7) asked for /a:o and /b:o and was"),
                                    HasSubstr("may not publish /a:o")));
+  EXPECT_EQ(found[0].mend,
+            "remove the cause (for example, allow it in the policy), then start the component "
+            "again");
   // Who had it open then has died: the one that was refused may have gone long before.
   status.deaths = {{"nav", 12, 1000, shm::monotonic_now(), {"/a:o", "/b:o"}, {}, {}}};
   EXPECT_THAT(watch::examine_ports(status), IsEmpty());
