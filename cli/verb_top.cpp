@@ -141,6 +141,7 @@ class Top {
       next_picture_ = 0;
     }
     problem_ = std::move(news.problem);
+    view_.set_silent(news.is_silent);
     const std::string shown = problem_.empty() ? tapper_.problem() : problem_;
     if (shown != shown_problem_) next_picture_ = 0;
     view_.set_problem(shown_problem_ = shown);

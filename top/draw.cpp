@@ -170,6 +170,10 @@ Line View::title(std::size_t columns) const {
     return two_sided(left, "  NO DAEMON: the last model decides", columns, Style::kTitle,
                      Style::kWarning, charset_);
   }
+  if (is_silent_) {
+    return two_sided(left, "  NO ANSWER from the daemon", columns, Style::kTitle, Style::kWarning,
+                     charset_);
+  }
   return two_sided(left, "  live", columns, Style::kTitle, Style::kTitle, charset_);
 }
 

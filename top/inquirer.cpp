@@ -12,6 +12,7 @@
 
 #include "shm/clock.hpp"
 #include "top/signals_blocked.hpp"
+#include "wire/call.hpp"
 
 namespace arbiter::top {
 namespace {
@@ -54,7 +55,8 @@ Inquirer::News Inquirer::take_news() {
   static_cast<void>(!::read(bell_.get(), &rings, sizeof rings));
   const std::lock_guard lock(mutex_);
   News news = std::exchange(news_, {});
-  news_.problem = news.problem;  // holds until it is mended
+  news_.problem = news.problem;  // these hold until they are mended
+  news_.is_silent = news.is_silent;
   return news;
 }
 
@@ -82,7 +84,12 @@ void Inquirer::take_census() {
     now.status = instance_->status();
   } catch (const std::exception& error) {
     const std::string problem = error.what();
-    tell([&](News& news) { news.problem = problem; });
+    const bool is_silent = dynamic_cast<const wire::CallError*>(&error) != nullptr &&
+                           dynamic_cast<const wire::RefusedError*>(&error) == nullptr;
+    tell([&](News& news) {
+      news.problem = problem;
+      news.is_silent = is_silent;
+    });
     return;
   }
   now.at = shm::monotonic_now();
@@ -92,6 +99,7 @@ void Inquirer::take_census() {
   tell([&](News& news) {
     news.census = census;
     news.problem.clear();
+    news.is_silent = false;
   });
 }
 

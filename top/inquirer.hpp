@@ -42,7 +42,8 @@ class Inquirer {
   struct News {
     std::shared_ptr<const Census> census;  // null: none since the last time
     std::optional<WhyAnswer> why;
-    std::string problem;  // why there is no census now; "": there is one
+    std::string problem;     // why there is no census now; "": there is one
+    bool is_silent = false;  // for the daemon does not answer
   };
   [[nodiscard]] News take_news();
 

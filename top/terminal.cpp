@@ -32,6 +32,9 @@ void require_terminal() {
   if (::isatty(STDIN_FILENO) == 0 || ::isatty(STDOUT_FILENO) == 0) {
     throw ScreenError(std::string("this is not a terminal") + kOnce);
   }
+  if (terminal_name().empty()) {
+    throw ScreenError(std::string("TERM is not set, which says what the terminal is") + kOnce);
+  }
   const std::string what = "TERM is \"" + terminal_name() + "\", ";
   int error = 0;
   if (::setupterm(nullptr, STDOUT_FILENO, &error) != OK) {

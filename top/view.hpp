@@ -36,6 +36,8 @@ class View {
   }
   // Why there is nothing new of what is asked of the daemon; "": there is.
   void set_problem(std::string problem);
+  // The daemon is there and does not answer.
+  void set_silent(bool is_silent) { is_silent_ = is_silent; }
   // Shown if it is what was asked for last and nobody has closed it.
   void set_answer(const WhyAnswer& answer);
 
@@ -96,6 +98,7 @@ class View {
   bool is_typing_ = false;  // the filter
   std::set<std::string> tapped_;
   std::string problem_;
+  bool is_silent_ = false;
   std::string notice_;  // why the last key did nothing, or not what it seems to
   std::optional<Overlay> overlay_;
   std::optional<WhyQuestion> asked_;

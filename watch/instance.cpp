@@ -14,6 +14,7 @@
 #include "shm/descendants.hpp"
 #include "shm/segment.hpp"
 #include "wire/document.hpp"
+#include "wire/instances.hpp"
 #include "wire/meeting.hpp"
 #include "wire/rendezvous.hpp"
 
@@ -218,8 +219,9 @@ wire::Received Instance::ask(const wire::Message& question) {
     }
     const auto left = std::chrono::ceil<milliseconds>(give_up - Clock::now());
     if (left.count() <= 0) {
-      throw wire::CallError(has_daemon() ? "the daemon is there, but has not answered in time"
-                                         : "the daemon has gone, and no other has come");
+      if (!has_daemon()) throw wire::CallError("the daemon has gone, and no other has come");
+      throw wire::CallError(wire::describe_daemon(socket_.get(), caller_.instance) +
+                            " has not answered in time: " + wire::describe_silence(socket_.get()));
     }
     pollfd readable{epoll_.get(), POLLIN, 0};
     static_cast<void>(::poll(&readable, 1, static_cast<int>(left.count())));

@@ -235,7 +235,7 @@ void add_up(Exposition& out, bool is_up) {
 }
 
 void add_daemon(Exposition& out, const wire::Status& status) {
-  out.begin("daemon_info", Kind::kGauge, "The daemon.");
+  out.begin("daemon_info", Kind::kGauge, "The instance and the process of the daemon; always 1.");
   out.add({{"name", status.instance}, {"pid", std::to_string(status.pid)}}, 1);
   add_one(out, "clients", Kind::kGauge, "Connections to the daemon's socket.",
           std::to_string(status.clients));

@@ -319,6 +319,15 @@ TEST_F(TopScreen, SortsByTheNextColumn) {
   ASSERT_TRUE(top_.wait_for("ACTIVITY▾")) << top_.text();
 }
 
+// Its title said "live", and the counts were gone without a word.
+TEST_F(TopScreen, SaysThatTheDaemonDoesNotAnswerAndWhatToDo) {
+  daemon_.process().stop();
+  ASSERT_TRUE(top_.wait_for("NO ANSWER from the daemon")) << top_.text();
+  ASSERT_TRUE(top_.wait_for("run: kill -CONT ")) << top_.text();
+  daemon_.process().resume();
+  ASSERT_TRUE(top_.wait_for("  live")) << top_.text();
+}
+
 TEST_F(TopScreen, GoesOnWithoutADaemonAndWithTheNext) {
   daemon_.kill();
   ASSERT_TRUE(top_.wait_for("NO DAEMON")) << top_.text();
