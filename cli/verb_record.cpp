@@ -129,6 +129,11 @@ int record_into_file(const RecordOptions& options, const recorder::RecorderOptio
 }
 
 int record(RecordOptions& options) {
+  if (options.out == "-") {
+    throw CLI::ValidationError("--output",
+                               "a recording is a file, and cannot go to standard output; give it a "
+                               "name, such as incident.mcap");
+  }
   if (options.is_dump) return dump(options.out, options.patience);
   std::signal(SIGXFSZ, SIG_IGN);  // a file that has become too large is an error as any other
   const auto settings = recorder_options(options);
@@ -180,7 +185,7 @@ void add_flight_options(CLI::App& verb, const std::shared_ptr<RecordOptions>& op
           "--memory",
           [options](const std::string& text) { options->flight.memory = read_size(text); },
           "How much memory --ring may use (default 64MiB): beyond it the oldest records give way, "
-          "even if they are younger than --ring's time")
+          "even if they are younger than --ring's time; before them, payloads beyond half of it")
       ->type_name("SIZE")
       ->needs(ring);
   verb.add_option_function<std::string>(
@@ -228,7 +233,7 @@ void add_record(CLI::App& app, int& exit_code) {
                    "Whose samples are kept: all, none (default), or a pattern of output ports")
       ->type_name("all|none|PATTERN");
   verb->add_option("--compression", options->compression, "zstd (default), lz4 or none")
-      ->check(CLI::IsMember({"zstd", "lz4", "none"}));
+      ->check(one_of({"zstd", "lz4", "none"}));
   verb->add_option_function<std::string>(
           "--duration",
           [options](const std::string& text) { options->duration = read_time("--duration", text); },

@@ -80,7 +80,9 @@ shm::FileDescriptor lock(const std::string& prefix) {
     throw std::runtime_error("cannot open " + path + ": " + std::strerror(errno));
   }
   if (::flock(file.get(), LOCK_EX | LOCK_NB) != 0) {
-    throw std::runtime_error("another flight recorder writes to " + prefix);
+    throw std::runtime_error("another flight recorder writes to " + prefix +
+                             "; give another -o, or ask that one: arbiter record --dump -o " +
+                             prefix);
   }
   return file;
 }

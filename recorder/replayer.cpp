@@ -57,7 +57,7 @@ Replayer::Replayer(const ReplayOptions& options) : options_(options) {
   survey();
   choose();
   if (sources_.empty()) {
-    throw ReplayError(options_.file + " has no arrival of what you have chosen");
+    throw NothingChosen(options_.file + " has no arrival of what you have chosen");
   }
   refuse_without_payloads();
   if (options_.speed > 0) require_end(options_.file, latest_ - first_, options_.speed);

@@ -48,6 +48,12 @@ class ReplayError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
+// Nothing of the recording is at what was chosen.
+class NothingChosen : public ReplayError {
+ public:
+  using ReplayError::ReplayError;
+};
+
 class Replayer {
  public:
   // Reads the file once, to know its sources, and opens their ports. Throws ReplayError, Error,

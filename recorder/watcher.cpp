@@ -83,8 +83,17 @@ void Watcher::run() {
   }
 }
 
+void Watcher::tell_of_daemon() {
+  const bool is_alone = !instance_->has_daemon();
+  if (is_alone == std::exchange(is_alone_, is_alone)) return;
+  options_.say(is_alone ? "the daemon has gone; its last decisions stay in force, and recording "
+                          "goes on"
+                        : "a daemon is there again");
+}
+
 void Watcher::look() {
   instance_->update();
+  tell_of_daemon();
   if (instance_->memory() != memory_) {
     begin_again();
     return;

@@ -59,6 +59,7 @@ class Watcher {
  private:
   void run();
   void look();
+  void tell_of_daemon();
   void begin();
   void begin_again();
   void take_up_model();
@@ -106,6 +107,7 @@ class Watcher {
   // Output ports and their processes, of components that the daemon does not know.
   std::set<std::pair<std::string, std::int32_t>> strangers_;
   OpenPorts ports_{0};
+  bool is_alone_ = false;
   Nanoseconds last_ports_ = 0;
   std::vector<std::shared_ptr<TapReader>> opened_;  // and not handed over yet
 

@@ -245,6 +245,9 @@ TEST(Record, GoesOnWhereADaemonTakesOver) {
       [](const auto& model) { return model.generation == 2; });
   low.publish(4);
   EXPECT_EQ(recording.end(), 0) << recording.error();
+  EXPECT_THAT(recording.error(),
+              HasSubstr("arbiter: the daemon has gone; its last decisions stay in force, and "
+                        "recording goes on\narbiter: a daemon is there again\n"));
   EXPECT_EQ(recording.records<Arrival>().size(), 4u);
   const json result = recording.simulate();
   EXPECT_EQ(result["equal"], 4) << result;
@@ -385,6 +388,9 @@ TEST(Record, SaysWhatIsWrong) {
   result = arbiter({"record", "-o", other, "--instance", "no-such"});
   EXPECT_EQ(result.exit_code, 1);
   EXPECT_FALSE(std::filesystem::exists(other));
+  result = arbiter({"record", "-o", "-"});
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_THAT(result.err, HasSubstr("cannot go to standard output"));
 }
 
 }  // namespace

@@ -29,8 +29,10 @@
 // nothing, and say so on standard error once for each port; idle() is true, and winner() is empty.
 // A child may read the samples that were held at the fork for as long as its parent holds them, and
 // may make a Node of its own. A program that calls daemon(3) must therefore make its node
-// afterwards. When the process ends, its ports are closed, whatever its children do. A child of
-// vfork() runs in its parent's memory: it may only call exec or _exit.
+// afterwards; and so must one that closes all descriptors that it knows nothing of, as closefrom(3)
+// does: without those of a node nobody can wake its thread, and its destructor waits for ever. When
+// the process ends, its ports are closed, whatever its children do. A child of vfork() runs in its
+// parent's memory: it may only call exec or _exit.
 #pragma once
 
 #include <arbiter/bytes.hpp>
