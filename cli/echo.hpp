@@ -3,7 +3,8 @@
 //   verb_echo.cpp       its options
 //   echo_loop.cpp       when it looks, and until when
 //   echo_tap.cpp        prints what a tap tells
-//   echo_hosts.cpp     from which hosts arrivals come
+//   echo_hosts.cpp      from which hosts arrivals come
+//   echo_news.cpp       what becomes of the daemon and of the model
 //   echo_rate.cpp       prints how often, how regularly and how much
 //   echo_component.cpp  opens an input port itself, and prints what it takes
 #pragma once
@@ -14,6 +15,7 @@
 
 #include <arbiter/arbiter.hpp>
 
+#include "cli/echo_news.hpp"
 #include "shm/activity.hpp"
 #include "shm/file_descriptor.hpp"
 
@@ -38,14 +40,15 @@ int echo_rate(const EchoOptions& options, const shm::FileDescriptor& interrupts)
 int echo_component(const EchoOptions& options, const shm::FileDescriptor& interrupts);
 
 shm::Nanoseconds end_of_echo(const EchoOptions& options, shm::Nanoseconds started);
-// Calls look() when `fd` is readable, and at least once in an interval, until that returns false,
-// the time is over, or `interrupts` is readable.
+// Calls look() when `fd` is readable, and ten times a second, until that returns false, the time is
+// over, or `interrupts` is readable.
 void echo_while(const EchoOptions& options, int fd, const shm::FileDescriptor& interrupts,
-                shm::Nanoseconds interval, const std::function<bool()>& look);
+                EchoNews& news, const std::function<bool()>& look);
 
 // Whether PORT is an output port or an input port, as far as the daemon knows; else by the end of
-// its name. Says on standard error if nobody has named it, or has it open.
-TapOf kind_of_port(const EchoOptions& options);
+// its name. Says on standard error if nobody has named it, or has it open. `instance`: null where
+// it cannot be observed.
+TapOf kind_of_port(const EchoOptions& options, watch::Instance* instance);
 
 // "01 02 … ", all bytes or the first few.
 std::string hex_of(const Bytes& bytes, std::size_t most);

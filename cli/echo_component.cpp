@@ -28,7 +28,7 @@ class Echo {
         started_(shm::monotonic_now()) {}
 
   int run() {
-    echo_while(options_, in_.fd(), interrupts_, shm::kForever, [this] { return print_all(); });
+    echo_while(options_, in_.fd(), interrupts_, news_, [this] { return print_all(); });
     return finish();
   }
 
@@ -98,6 +98,7 @@ class Echo {
   const EchoOptions& options_;
   const shm::FileDescriptor& interrupts_;
   EchoHosts hosts_{options_.instance};
+  EchoNews news_{observe_for_echo(options_.instance), options_.port};
   Node node_;
   InputPort<void> in_;
   const shm::Nanoseconds started_;

@@ -9,22 +9,29 @@
 #include "shm/clock.hpp"
 
 namespace arbiter::cli {
+namespace {
+
+// What has become of samples at the take, nobody rings for, nor for another model.
+constexpr shm::Nanoseconds kEchoLookInterval = 100'000'000;
+
+}  // namespace
 
 shm::Nanoseconds end_of_echo(const EchoOptions& options, shm::Nanoseconds started) {
   return options.duration == shm::kForever ? shm::kForever : started + options.duration;
 }
 
 void echo_while(const EchoOptions& options, int fd, const shm::FileDescriptor& interrupts,
-                shm::Nanoseconds interval, const std::function<bool()>& look) {
+                EchoNews& news, const std::function<bool()>& look) {
   const shm::Nanoseconds end = end_of_echo(options, shm::monotonic_now());
   // Whoever reads this may go while nothing arrives.
   pollfd ready[] = {{fd, POLLIN, 0}, {interrupts.get(), POLLIN, 0}, {STDOUT_FILENO, 0, 0}};
   while (look()) {
     std::cout.flush();
-    const shm::Nanoseconds left = std::min(end - shm::monotonic_now(), interval);
+    news.tell();
+    const shm::Nanoseconds left = std::min(end - shm::monotonic_now(), kEchoLookInterval);
     if (left <= 0) return;
     const timespec span{left / 1'000'000'000, left % 1'000'000'000};
-    ppoll(ready, 3, left > shm::kMaxTime ? nullptr : &span, nullptr);
+    ppoll(ready, 3, &span, nullptr);
     if (ready[1].revents != 0) return;
     if ((ready[2].revents & (POLLERR | POLLHUP)) != 0) std::cout.setstate(std::ios::badbit);
     if (!std::cout) return;

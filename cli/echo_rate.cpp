@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <iostream>
 #include <map>
+#include <optional>
 
 #include <nlohmann/json.hpp>
 
@@ -37,11 +38,15 @@ class Rate {
   [[nodiscard]] double bytes_per_second(double seconds) const {
     return static_cast<double>(bytes_) / seconds;
   }
-  // The standard deviation of the time between two arrivals; 0: there were not enough of them.
-  [[nodiscard]] double jitter_ns() const {
-    return intervals_ < 2 ? 0 : std::sqrt(squares_ / static_cast<double>(intervals_));
+  // The standard deviation of the time between two arrivals, and the longest such time; nothing:
+  // there were not enough of them.
+  [[nodiscard]] std::optional<double> jitter_ns() const {
+    if (intervals_ < 2) return std::nullopt;
+    return std::sqrt(squares_ / static_cast<double>(intervals_));
   }
-  [[nodiscard]] double longest_ns() const { return longest_; }
+  [[nodiscard]] std::optional<double> longest_ns() const {
+    return intervals_ == 0 ? std::nullopt : std::optional(longest_);
+  }
   void begin_again() { *this = Rate(last_); }
 
   Rate() = default;
@@ -72,6 +77,15 @@ std::string with_digits(double value, int digits) {
   return text;
 }
 
+// "0.032 ms"; "-": there is none.
+std::string span_of_rate(const std::optional<double>& ns) {
+  return ns ? with_digits(*ns / 1e6, 3) + " ms" : "-";
+}
+
+nlohmann::json json_of_rate(const std::optional<double>& ns) {
+  return ns ? nlohmann::json(std::llround(*ns)) : nlohmann::json(nullptr);
+}
+
 std::string bytes_text(double bytes) {
   if (bytes >= 1e6) return with_digits(bytes / 1e6, 2) + " MB/s";
   if (bytes >= 1e3) return with_digits(bytes / 1e3, 2) + " kB/s";
@@ -80,9 +94,11 @@ std::string bytes_text(double bytes) {
 
 class RateEcho {
  public:
-  RateEcho(const EchoOptions& options, TapOf of, const shm::FileDescriptor& interrupts)
+  RateEcho(const EchoOptions& options, TapOf of, EchoNews& news,
+           const shm::FileDescriptor& interrupts)
       : options_(options),
         is_input_(of == TapOf::input),
+        news_(news),
         interrupts_(interrupts),
         node_("arbiter-echo", live_options(options.instance)),
         tap_(node_.tap(options.port, tap_options(of))) {}
@@ -96,6 +112,7 @@ class RateEcho {
       const bool is_interrupted =
           sleep_until(std::min(shm::monotonic_now() + kLookInterval, next), interrupts_);
       look();
+      news_.tell();
       const shm::Nanoseconds now = shm::monotonic_now();
       if (now < next && !is_interrupted) continue;
       print(static_cast<double>(now - line) / kSecond);
@@ -137,15 +154,15 @@ class RateEcho {
                                     {"source", source},
                                     {"samples", rate.samples()},
                                     {"hz", rate.hz(seconds)},
-                                    {"jitter_ns", rate.jitter_ns()},
-                                    {"longest_ns", rate.longest_ns()},
+                                    {"jitter_ns", json_of_rate(rate.jitter_ns())},
+                                    {"longest_ns", json_of_rate(rate.longest_ns())},
                                     {"bytes_per_second", rate.bytes_per_second(seconds)}}
                          .dump()
                   << '\n';
       } else {
         std::cout << source << "  " << with_digits(rate.hz(seconds), 1) << " Hz  jitter "
-                  << with_digits(rate.jitter_ns() / 1e6, 3) << " ms  longest "
-                  << with_digits(rate.longest_ns() / 1e6, 3) << " ms  "
+                  << span_of_rate(rate.jitter_ns()) << "  longest "
+                  << span_of_rate(rate.longest_ns()) << "  "
                   << bytes_text(rate.bytes_per_second(seconds)) << '\n';
       }
       rate.begin_again();
@@ -155,6 +172,7 @@ class RateEcho {
 
   const EchoOptions& options_;
   const bool is_input_;
+  EchoNews& news_;
   const shm::FileDescriptor& interrupts_;
   Node node_;
   Tap<> tap_;
@@ -165,7 +183,9 @@ class RateEcho {
 }  // namespace
 
 int echo_rate(const EchoOptions& options, const shm::FileDescriptor& interrupts) {
-  return RateEcho(options, kind_of_port(options), interrupts).run();
+  const auto instance = observe_for_echo(options.instance);
+  EchoNews news(instance, options.port);
+  return RateEcho(options, kind_of_port(options, instance.get()), news, interrupts).run();
 }
 
 }  // namespace arbiter::cli

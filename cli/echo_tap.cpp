@@ -59,23 +59,22 @@ const char* name_of(Fate fate) {
 
 class TapEcho {
  public:
-  TapEcho(const EchoOptions& options, TapOf of, const shm::FileDescriptor& interrupts)
+  TapEcho(const EchoOptions& options, TapOf of, EchoNews& news,
+          const shm::FileDescriptor& interrupts)
       : options_(options),
         is_input_(of == TapOf::input),
+        news_(news),
         interrupts_(interrupts),
         node_("arbiter-echo", live_options(options.instance)),
         tap_(node_.tap(options.port, tap_options(of))),
         started_(shm::monotonic_now()) {}
 
   int run() {
-    echo_while(options_, tap_.fd(), interrupts_, kLookInterval, [this] { return print_all(); });
+    echo_while(options_, tap_.fd(), interrupts_, news_, [this] { return print_all(); });
     return finish();
   }
 
  private:
-  // What has become of samples at the take, nobody rings for.
-  static constexpr shm::Nanoseconds kLookInterval = 100'000'000;
-
   // False: that was enough.
   bool print_all() {
     while (const auto event = tap_.take()) {
@@ -194,6 +193,7 @@ class TapEcho {
 
   const EchoOptions& options_;
   const bool is_input_;
+  EchoNews& news_;
   const shm::FileDescriptor& interrupts_;
   EchoHosts hosts_{options_.instance};
   Node node_;
@@ -232,18 +232,13 @@ void say_if_nobody_has_it(const std::string& port, watch::Instance& instance, bo
 
 }  // namespace
 
-TapOf kind_of_port(const EchoOptions& options) {
+TapOf kind_of_port(const EchoOptions& options, watch::Instance* instance) {
   const auto by_name = [&] {
     const std::string& port = options.port;
     const bool is_input = port.size() > 2 && port.compare(port.size() - 2, 2, ":i") == 0;
     return is_input ? TapOf::input : TapOf::output;
   };
-  std::shared_ptr<watch::Instance> instance;
-  try {
-    instance = watch_instance("echo", options.instance);
-  } catch (const std::exception&) {
-    return by_name();  // the policy does not let us observe; or the tap will say what is wrong
-  }
+  if (instance == nullptr) return by_name();  // or the tap will say what is wrong
   const auto source = instance->find_source(options.port);
   const auto port = instance->find_port(options.port);
   if (source || port) {
@@ -267,7 +262,9 @@ TapOf kind_of_port(const EchoOptions& options) {
 }
 
 int echo_tap(const EchoOptions& options, const shm::FileDescriptor& interrupts) {
-  return TapEcho(options, kind_of_port(options), interrupts).run();
+  const auto instance = observe_for_echo(options.instance);
+  EchoNews news(instance, options.port);
+  return TapEcho(options, kind_of_port(options, instance.get()), news, interrupts).run();
 }
 
 }  // namespace arbiter::cli

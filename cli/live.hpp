@@ -57,6 +57,9 @@ class DaemonNews {
 // activity ends: publishers do not ring for those who merely observe.
 inline constexpr shm::Nanoseconds kLookEvery = 2'000'000;
 
+// When such a verb asks a daemon again that has not answered: nothing else is done meanwhile.
+inline constexpr shm::Nanoseconds kAskAgainLater = 5'000'000'000;
+
 // The daemon's status document, as text. Throws wire::CallError, wire::DocumentError.
 std::string fetch_status_text(const std::string& verb, const std::string& instance);
 wire::Status fetch_status(const std::string& verb, const std::string& instance);

@@ -13,6 +13,8 @@
 
 #include "cli/broken_pipe.hpp"
 #include "cli/verbs.hpp"
+#include "command_line/standard_streams.hpp"
+#include "command_line/values.hpp"
 #include "command_line/wrong_use.hpp"
 #include "recording/mcap.hpp"
 #include "rules/model/load.hpp"
@@ -60,10 +62,11 @@ void add_exit_codes(CLI::App& app) {
   for (CLI::App* verb : app.get_subcommands({})) {
     const std::string footer = verb->get_footer();
     if (footer.find("Exit codes:") != std::string::npos) continue;
-    verb->footer(
-        footer +
-        "\n\nExit codes: 0 done; 1 an error in what you asked about, or no daemon; 2 wrong "
-        "use, or a file\nthat cannot be opened or written");
+    const bool asks_daemon = verb->get_option_no_throw("--instance") != nullptr;
+    verb->footer(footer + "\n\nExit codes: 0 done; 1 an error in what you asked about" +
+                 (asks_daemon ? ", or no daemon; 2 wrong use, or a file\nthat"
+                              : "; 2 wrong use, or a file that") +
+                 " cannot be opened or written");
   }
 }
 
@@ -119,6 +122,7 @@ int run(int argc, char** argv) {
   arbiter::cli::add_history(app, exit_code);
   arbiter::cli::add_stop(app, exit_code);
   add_exit_codes(app);
+  arbiter::command_line::refuse_empty(app, {"--text", "--hex"});  // a sample of no bytes
   app.failure_message(arbiter::command_line::wrong_use_text);
   std::vector<std::string> words = words_of(argc, argv);
   if (!words.empty() && !knows_verb(app, words.front())) return kWrongUse;
@@ -143,6 +147,7 @@ int run(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  if (!arbiter::command_line::open_standard_streams()) return kFailed;
   std::signal(SIGPIPE, SIG_IGN);  // bells of receivers that have died (cli/broken_pipe.hpp)
   std::signal(SIGXFSZ, SIG_IGN);  // and so is a limit to the size of files
   std::ios::sync_with_stdio(false);

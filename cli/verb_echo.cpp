@@ -14,14 +14,13 @@ namespace arbiter::cli {
 namespace {
 
 // Before anything is said of a port by that name.
-void require_name(const std::string& port) {
-  if (port.empty()) throw CLI::ValidationError("PORT", "the name is empty; echo takes one port");
+std::string problem_of_name(std::string& port) {
+  if (port.empty()) return "the name is empty; echo takes one port";
   const auto problem = rules::find_problem_in_port(port);
-  if (problem) throw CLI::ValidationError("PORT", problem->message + "; echo takes one port");
+  return problem ? problem->message + "; echo takes one port" : "";
 }
 
 int echo(const EchoOptions& options) {
-  require_name(options.port);
   const auto interrupts = catch_interrupts();
   if (options.as_component) return echo_component(options, interrupts);
   return options.rate ? echo_rate(options, interrupts) : echo_tap(options, interrupts);
@@ -35,7 +34,8 @@ void add_echo(CLI::App& app, int& exit_code) {
       "echo", "Watch a port, and print what arrives there and what becomes of it");
   verb->add_option("PORT", options->port,
                    "An output port: all its arrivals; an input port: what its arbiter accepts")
-      ->required();
+      ->required()
+      ->check(CLI::Validator(problem_of_name, ""));
   verb->add_option("--count", options->count,
                    "Stop after this many lines; with --rate, after this many seconds' rates")
       ->type_name("N")

@@ -8,6 +8,7 @@
 #include "cli/graph_picture.hpp"
 #include "cli/live.hpp"
 #include "cli/model_files.hpp"
+#include "cli/numbers.hpp"
 #include "cli/output_file.hpp"
 #include "cli/verbs.hpp"
 
@@ -44,7 +45,7 @@ void add_graph(CLI::App& app, int& exit_code) {
   verb->add_option("--view", options->view,
                    "behaviours: in meta-behaviours, with inhibitions; connections: components, "
                    "ports, rules; both; auto: behaviours if there are any")
-      ->check(CLI::IsMember({"auto", "behaviours", "connections", "both"}))
+      ->check(one_of({"auto", "behaviours", "connections", "both"}))
       ->type_name("WHICH");
   verb->add_option("--port", options->ports,
                    "Only what decides at this input port; may be given several times")

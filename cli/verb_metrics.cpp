@@ -52,7 +52,7 @@ class Source {
   std::string operator()() {
     try {
       std::string text = watch::metrics_of(fetch_status(caller_, kScrapeTime));
-      said_.clear();
+      if (!std::exchange(said_, {}).empty()) std::cerr << "arbiter: the daemon answers again\n";
       return text;
     } catch (const std::exception& error) {
       if (std::exchange(said_, error.what()) != error.what()) {

@@ -165,7 +165,7 @@ void add_payload_options(CLI::App& verb, PayloadOptions& payload) {
   auto* size = verb.add_option("--size", payload.size,
                                "Bytes of a sample, zeroed (default: as the type has, untyped 8)")
                    ->type_name("BYTES")
-                   ->check(CLI::Range(std::size_t{0}, kMaxPayload));
+                   ->check(whole_number_between(0, kMaxPayload));
   auto* text = verb.add_option("--text", payload.text, "The sample, as text")
                    ->type_name("TEXT")
                    ->excludes(size);
@@ -207,7 +207,9 @@ void add_pub(CLI::App& app, int& exit_code) {
                    "must have open; of a source that nobody has open, that of its input ports")
       ->type_name("PORT")
       ->excludes(type);
-  verb->add_flag("--strict", options->strict, "Publish nothing unless somebody can take it");
+  verb->add_flag(
+      "--strict", options->strict,
+      "Publish nothing, and end with 1, unless somebody can take the samples when it starts");
   verb->add_flag("--quiet", options->quiet, "Print the summary only");
   add_instance_option(*verb, options->instance);
   verb->footer(R"(Examples:

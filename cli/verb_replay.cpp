@@ -1,7 +1,10 @@
 // arbiter replay: publishes a recording into a running instance.
+#include <algorithm>
 #include <iostream>
 #include <memory>
+#include <set>
 #include <string>
+#include <variant>
 #include <vector>
 
 #include <CLI/CLI.hpp>
@@ -10,7 +13,10 @@
 #include "cli/numbers.hpp"
 #include "cli/progress.hpp"
 #include "cli/verbs.hpp"
+#include "command_line/shell_word.hpp"
+#include "evidence/record_reader.hpp"
 #include "recorder/replayer.hpp"
+#include "rules/model/quantifiers.hpp"
 #include "rules/text/names.hpp"
 
 namespace arbiter::cli {
@@ -24,6 +30,55 @@ struct ReplayVerb {
   std::vector<std::string> ports;
   std::string instance;
 };
+
+using Names = std::set<std::string>;
+
+// Of which anything arrived, or that were deactivated.
+Names sources_in(const std::string& file) {
+  Names names;
+  evidence::read_recording(file, evidence::Payloads::pass_over, [&](evidence::Record&& record) {
+    const bool is_event = std::holds_alternative<evidence::Arrival>(record) ||
+                          std::holds_alternative<evidence::Deactivation>(record);
+    if (is_event) names.insert(evidence::context_of(record)->source);
+  });
+  return names;
+}
+
+bool fits_any(const std::vector<std::string>& patterns, const Names& names) {
+  return std::any_of(names.begin(), names.end(), [&](const std::string& name) {
+    return std::any_of(patterns.begin(), patterns.end(),
+                       [&](const std::string& pattern) { return rules::matches(pattern, name); });
+  });
+}
+
+// Throws what says why there is nothing to publish.
+[[noreturn]] void say_what_it_has(const ReplayVerb& verb, const std::string& what) {
+  const Names names = sources_in(verb.file);
+  if (names.empty()) {
+    throw recorder::ReplayError(verb.file + ": nothing arrived while it was recorded");
+  }
+  const std::string has = "; it has " + rules::enumerate({names.begin(), names.end()});
+  if (!verb.sources.empty() && !fits_any(verb.sources, names)) {
+    std::string text;
+    for (const std::string& pattern : verb.sources) {
+      text += (text.empty() ? "--source " : ", ") + command_line::shell_word(pattern);
+    }
+    throw CLI::ValidationError(text + " matches no source in " + verb.file + has);
+  }
+  throw recorder::ReplayError(what + has);
+}
+
+// Opens the ports.
+std::unique_ptr<recorder::Replayer> replayer_for(const ReplayVerb& verb,
+                                                 const recorder::ReplayOptions& options,
+                                                 ProgressLine& line) {
+  try {
+    return std::make_unique<recorder::Replayer>(options);
+  } catch (const recorder::NothingChosen& error) {
+    line.clear();
+    say_what_it_has(verb, error.what());
+  }
+}
 
 int replay(const ReplayVerb& verb) {
   const auto interrupts = catch_interrupts();
@@ -39,9 +94,10 @@ int replay(const ReplayVerb& verb) {
     line.clear();
     std::cerr << "arbiter: " + text + '\n';
   };
-  recorder::Replayer replayer(options);
+  const auto replayer = replayer_for(verb, options, line);
   line.clear();
-  const auto replayed = replayer.run(interrupts);
+  const auto replayed = replayer->run(interrupts);
+  if (replayed.was_interrupted) std::cout << "stopped before the end: ";
   std::cout << rules::counted(replayed.samples, "sample") << ", "
             << rules::counted(replayed.signals, "signal") << " and "
             << rules::counted(replayed.deactivations, "deactivation") << " of "

@@ -5,9 +5,12 @@
 // force, for its names.
 #include <algorithm>
 #include <cstdint>
+#include <exception>
 #include <iostream>
 #include <memory>
 #include <optional>
+#include <set>
+#include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
@@ -23,6 +26,7 @@
 #include "rules/text/names.hpp"
 #include "shm/clock.hpp"
 #include "watch/live_statement.hpp"
+#include "wire/rendezvous.hpp"
 
 namespace arbiter::cli {
 namespace {
@@ -37,23 +41,58 @@ constexpr const char* kArgument = "--until";
 struct WaitOptions {
   std::string condition;
   std::string instance;
-  shm::Nanoseconds timeout = shm::kForever;
+  std::optional<shm::Nanoseconds> timeout;  // nothing: never, and a daemon must be there
   shm::Nanoseconds hold = 0;
+  std::string timeout_text, hold_text;  // as they were typed
   bool json = false;
 };
 
+// Some ways of writing shm::kForever are later than any time.
+shm::Nanoseconds end_of(const WaitOptions& options, shm::Nanoseconds started) {
+  const shm::Nanoseconds span = options.timeout.value_or(shm::kForever);
+  return span >= shm::kForever - started ? shm::kForever : started + span;
+}
+
+// The instance; with --timeout, one whose daemon comes in time. Null: interrupted meanwhile.
+std::shared_ptr<watch::Instance> find_instance(const WaitOptions& options,
+                                               shm::Nanoseconds deadline,
+                                               const shm::FileDescriptor& interrupts) {
+  constexpr shm::Nanoseconds kLookAgain = 50'000'000;
+  for (bool has_said = false;;) {
+    try {
+      return follow_instance("wait", options.instance);
+    } catch (const wire::RefusedError&) {
+      throw;
+    } catch (const wire::CallError& error) {
+      const shm::Nanoseconds now = shm::monotonic_now();
+      if (!options.timeout || *options.timeout == 0) throw;
+      if (now >= deadline) {
+        throw std::runtime_error("timed out after " + seconds_text(*options.timeout) + ": " +
+                                 error.what());
+      }
+      if (!std::exchange(has_said, true)) {
+        std::cerr << "arbiter: no arbiterd of instance "
+                  << rules::quote(wire::instance_name(options.instance))
+                  << " answers yet; waiting for one\n";
+      }
+      if (sleep_until(std::min(now + kLookAgain, deadline), interrupts)) return nullptr;
+    }
+  }
+}
+
 class Waiting {
  public:
-  explicit Waiting(const WaitOptions& options)
+  Waiting(const WaitOptions& options, rules::Statement condition, shm::Nanoseconds started,
+          std::shared_ptr<watch::Instance> instance, const shm::FileDescriptor& interrupts)
       : options_(options),
-        condition_(read_condition(kArgument, options.condition)),
-        started_(shm::monotonic_now()),
-        instance_(follow_instance("wait", options.instance)),
+        condition_(std::move(condition)),
+        started_(started),
+        instance_(std::move(instance)),
+        interrupts_(interrupts),
         statement_(instance_, condition_) {}
 
   int run() {
-    const shm::Nanoseconds deadline =
-        options_.timeout >= shm::kForever - started_ ? shm::kForever : started_ + options_.timeout;
+    const shm::Nanoseconds deadline = end_of(options_, started_);
     for (;;) {
       instance_->update();
       news_.tell(*instance_);
@@ -61,7 +100,8 @@ class Waiting {
       const shm::Nanoseconds now = shm::monotonic_now();
       if (is_fulfilled(look)) return report(true, look, now);
       if (now >= deadline) return report(false, look, now);
-      sleep_until(std::min({now + kLookEvery, next_event(look, now), deadline}), nobody_);
+      const auto next = std::min({now + kLookEvery, next_event(look, now), deadline});
+      if (sleep_until(next, interrupts_)) return interrupted_exit_code(interrupts_);
     }
   }
 
@@ -121,7 +161,7 @@ class Waiting {
   }
 
   void write_why_not(const LiveStatement::Look& look) const {
-    std::cerr << "arbiter: timed out after " << seconds_text(options_.timeout) << ": "
+    std::cerr << "arbiter: timed out after " << seconds_text(options_.timeout.value_or(0)) << ": "
               << rules::quote(condition_.text) << ' ';
     if (look.truth == Truth::kUnknown) {
       std::cerr << (instance_->has_daemon()
@@ -134,29 +174,54 @@ class Waiting {
                       ? "holds, but has not done so for " + seconds_text(options_.hold)
                       : std::string("does not hold"))
               << '\n';
+    const auto useless = winners_that_cannot_deliver();
     for (const auto& [port, winner] : look.winners) {
-      std::cerr << "  " << winner.value_or("nobody") << " wins at " << port << "  (arbiter why "
-                << port << ")\n";
+      const bool is_useless = winner && useless.contains({port, *winner});
+      std::cerr << "  " << winner.value_or("nobody")
+                << (is_useless ? " is selected at " : " wins at ") << port
+                << (is_useless ? ", but cannot deliver" : "") << "  (arbiter why " << port << ")\n";
     }
     for (const auto& [source, is_active] : look.active) {
       std::cerr << "  " << source << (is_active ? " is active\n" : " is inactive\n");
     }
   }
 
+  // By port and source. Only the daemon knows; empty where it cannot be asked.
+  [[nodiscard]] std::set<std::pair<std::string, std::string>> winners_that_cannot_deliver() const {
+    std::set<std::pair<std::string, std::string>> found;
+    if (!instance_->has_daemon()) return found;
+    try {
+      for (const wire::InputStatus& input : instance_->status().inputs) {
+        if (input.cannot_deliver) found.emplace(input.name, input.cannot_deliver->source);
+      }
+    } catch (const std::exception&) {  // it has gone since, or does not answer
+    }
+    return found;
+  }
+
   const WaitOptions& options_;
   const rules::Statement condition_;
   const shm::Nanoseconds started_;
   const std::shared_ptr<watch::Instance> instance_;
+  const shm::FileDescriptor& interrupts_;
   LiveStatement statement_;
-  const shm::FileDescriptor nobody_;  // no interrupts: a signal ends this as any program
   std::optional<shm::Nanoseconds> held_since_;
   std::uint64_t warned_of_ = 0;
   DaemonNews news_{"watching"};
 };
 
 int wait(const WaitOptions& options) {
+  auto condition = read_condition(kArgument, options.condition);
+  if (options.timeout && options.hold > *options.timeout) {
+    throw CLI::ValidationError("--for " + options.hold_text + " is longer than --timeout " +
+                               options.timeout_text + ", so it could never be true");
+  }
+  const shm::FileDescriptor interrupts = catch_interrupts();
+  const shm::Nanoseconds started = shm::monotonic_now();
+  auto instance = find_instance(options, end_of(options, started), interrupts);
+  if (instance == nullptr) return interrupted_exit_code(interrupts);
   try {
-    return Waiting(options).run();
+    return Waiting(options, std::move(condition), started, std::move(instance), interrupts).run();
   } catch (const watch::StatementError& error) {
     rules::write_text(std::cerr, error.diagnostics());
     throw;
@@ -175,11 +240,19 @@ void add_wait(CLI::App& app, int& exit_code) {
       ->required();
   verb->add_option_function<std::string>(
           "--timeout",
-          [options](const std::string& text) { options->timeout = read_time("--timeout", text); },
-          "Give up after this time, such as 500ms or 5s; 0s looks once; by default, never")
+          [options](const std::string& text) {
+            options->timeout = read_time("--timeout", text);
+            options->timeout_text = text;
+          },
+          "Give up after this time, such as 500ms or 5s, and until then wait for a daemon, too; 0s "
+          "looks once; by default, never")
       ->type_name("DURATION");
   verb->add_option_function<std::string>(
-          "--for", [options](const std::string& text) { options->hold = read_time("--for", text); },
+          "--for",
+          [options](const std::string& text) {
+            options->hold = read_time("--for", text);
+            options->hold_text = text;
+          },
           "Wait until the condition has been true for this time, at every look")
       ->type_name("DURATION");
   verb->add_flag("--json", options->json,
@@ -193,9 +266,10 @@ void add_wait(CLI::App& app, int& exit_code) {
       "A source's name says that it is active; winner(PORT) = SOURCE, winner(PORT) = any(GLOB),\n"
       "idle(PORT), and, or, not, implies, iff, any(GLOB), all(GLOB) and none(GLOB) are as in\n"
       "statements. A change is seen within about 2 ms. One that lasts for less may be missed.\n\n"
-      "Exit codes: 0 the condition is true; 1 no daemon, you may not observe, or the model in "
-      "force does\nnot have a name of the condition; 2 wrong use, or a condition that cannot be "
-      "read; 3 timed out");
+      "Exit codes: 0 the condition is true; 1 no daemon (with --timeout, none has come by then), "
+      "you "
+      "may\nnot observe, or the model in force does not have a name of the condition; 2 wrong use, "
+      "or a\ncondition that cannot be read; 3 timed out; 130 stopped by Ctrl-C (143 by SIGTERM)");
   verb->callback([options, &exit_code] { exit_code = wait(*options); });
 }
 

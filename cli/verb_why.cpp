@@ -11,6 +11,7 @@
 #include "cli/live.hpp"
 #include "cli/numbers.hpp"
 #include "cli/other_hosts.hpp"
+#include "cli/port_name.hpp"
 #include "cli/verbs.hpp"
 #include "cli/why_answer.hpp"
 #include "cli/why_elsewhere.hpp"
@@ -48,9 +49,12 @@ void add_why(CLI::App& app, int& exit_code) {
   const auto options = std::make_shared<WhyOptions>();
   CLI::App* verb = app.add_subcommand(
       "why", "Show who wins at an input port, since when, and what keeps the others out");
-  verb->add_option("PORT", options->port, "An input port's name")->required();
-  auto* source = verb->add_option("SOURCE", options->source,
-                                  "An output port's name: show its connection only");
+  verb->add_option("PORT", options->port, "An input port's name")
+      ->required()
+      ->check(name_of_port());
+  auto* source =
+      verb->add_option("SOURCE", options->source, "An output port's name: show its connection only")
+          ->check(name_of_port());
   auto* follow = verb->add_flag("--follow", options->follow,
                                 "Print each change of the winner, and its cause, as it comes; of "
                                 "a port of another host, what has changed every half second");

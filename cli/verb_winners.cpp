@@ -70,6 +70,7 @@ class Announcer {
       news_.tell(*instance_);
       const auto changes = winners_.look();
       for (const watch::WinnerAt& change : changes) tell(change);
+      warn_of_patterns_without_winners();
       if (!goes_on()) return 1;
       const shm::Nanoseconds now = shm::monotonic_now();
       if (now >= open_again_ && instance_->has_daemon()) {
@@ -167,6 +168,23 @@ class Announcer {
     return may_go_on;
   }
 
+  // Once for each model that comes into force: it may arbitrate other ports than the one before.
+  void warn_of_patterns_without_winners() {
+    if (options_.patterns == WinnersOptions().patterns || !instance_->has_daemon()) return;
+    const auto memory = instance_->memory();
+    const std::uint64_t generation = memory->tables().snapshot().generation;
+    if (warned_of_ == memory && warned_of_generation_ == generation) return;
+    if (shm::monotonic_now() < ask_again_) return;
+    try {
+      PatternCheck("--port", instance_->status()).arbitrated_inputs(options_.patterns);
+      warned_of_ = memory;
+      warned_of_generation_ = generation;
+    } catch (const wire::CallError&) {
+      // It has gone since, or is busy, which has held up the announcer.
+      ask_again_ = shm::monotonic_now() + kAskAgainLater;
+    }
+  }
+
   // Somebody else may have had them, or the policy may have changed since.
   void open_waiting() {
     const auto waiting = waiting_;
@@ -187,24 +205,14 @@ class Announcer {
   std::vector<std::string> problems_;  // why, of the last look
   shm::Nanoseconds open_again_ = shm::monotonic_now() + kOpenEvery;
   bool has_started_ = false;
+  // The model of the last warning is this memory's.
+  std::shared_ptr<const shm::DecisionMemory> warned_of_;
+  std::uint64_t warned_of_generation_ = 0;
+  shm::Nanoseconds ask_again_ = 0;
   DaemonNews news_{"announcing"};
 };
 
-void warn_of_patterns_without_winners(const WinnersOptions& options) {
-  if (options.patterns == WinnersOptions().patterns) return;
-  try {
-    const wire::Status status = fetch_status("winners", options.instance);
-    PatternCheck("--port", status).arbitrated_inputs(options.patterns);
-  } catch (const wire::CallError&) {
-    // It has gone since: when it is there again, the announcer goes on.
-  }
-}
-
-int winners(const WinnersOptions& options) {
-  Announcer announcer(options, catch_interrupts());
-  warn_of_patterns_without_winners(options);
-  return announcer.run();
-}
+int winners(const WinnersOptions& options) { return Announcer(options, catch_interrupts()).run(); }
 
 }  // namespace
 
@@ -221,7 +229,7 @@ void add_winners(CLI::App& app, int& exit_code) {
           [options](const std::string& text) {
             options->every = read_time("--every", text);
             if (options->every >= kLookEvery) return;
-            throw CLI::ValidationError("--every", "at least 2ms");
+            throw CLI::ValidationError("--every", "must be at least 2ms");
           },
           "How often to publish the winner where it has not changed (default 1s)")
       ->type_name("DURATION");

@@ -15,6 +15,7 @@
 #include <CLI/CLI.hpp>
 
 #include "command_line/shell_word.hpp"
+#include "command_line/values.hpp"
 #include "rules/text/names.hpp"
 #include "shm/utf8.hpp"
 
@@ -161,7 +162,7 @@ inline std::string text_of_missing_verb(const CLI::App& verb, const std::string&
   std::vector<std::string> names;
   for (const CLI::App* each : verbs_of(verb)) names.push_back(each->get_name());
   const std::vector<std::string> words = words_in(verb.remaining());
-  if (words.empty()) return name + " needs a verb: " + rules::enumerate(names);
+  if (words.empty()) return name + " needs a verb: " + alternatives(names);
   return name + " has no verb " + rules::quote(words.front()) +
          rules::advise(words.front(), {names.begin(), names.end()},
                        "it has " + rules::enumerate(names));
@@ -177,6 +178,18 @@ inline std::string text_of_missing(const CLI::App& verb, const std::string& miss
   }
   const std::string option = missing.substr(0, missing.find(' '));
   return missing + meant(verb, words, option.starts_with("--") ? option : "");
+}
+
+// As CLI11 says it, "--silence: 1 required CODE missing"; another text stays as it is.
+inline std::string text_of_missing_value(const std::string& text) {
+  constexpr std::string_view kBefore = ": 1 required ";
+  constexpr std::string_view kBehind = " missing";
+  const std::size_t at = text.find(kBefore);
+  if (at == std::string::npos || !text.ends_with(kBehind)) return text;
+  const std::string option = text.substr(0, at);
+  const std::size_t begin = at + kBefore.size();
+  return option + " needs a value; write: " + option + ' ' +
+         text.substr(begin, text.size() - kBehind.size() - begin);
 }
 
 // The first example that the verb's help has, to be put behind what lacks something else that would
@@ -206,7 +219,7 @@ inline std::string text_of(const CLI::Error& error, const Typed& typed,
     if (lacks_verb(verb)) return text_of_missing_verb(verb, typed.name);
     text = text_of_missing(verb, text);
   } else {
-    return text;
+    return is(CLI::ExitCodes::ArgumentMismatch) ? text_of_missing_value(text) : text;
   }
   return text.ends_with('?') ? text : text + example_of(verb);
 }

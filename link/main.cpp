@@ -15,6 +15,8 @@
 #include <CLI/CLI.hpp>
 
 #include "command_line/durations.hpp"
+#include "command_line/standard_streams.hpp"
+#include "command_line/values.hpp"
 #include "command_line/wrong_use.hpp"
 #include "gateway/core/say.hpp"
 #include "gateway/core/stop_signals.hpp"
@@ -118,25 +120,32 @@ struct CommandLine {
 void CommandLine::describe(CLI::App& app) {
   app.set_version_flag("--version", std::string("arbiter-link ") + ARBITER_VERSION);
   app.add_option(
-      "--instance", options.instance,
-      "Name of the daemon; by default $ARBITER_INSTANCE, or \"default\" if that is not set");
+         "--instance", options.instance,
+         "Name of the daemon; by default $ARBITER_INSTANCE, or \"default\" if that is not set")
+      ->type_name("NAME");
   app.add_option("--host", options.host,
-                 "The name of this host for the others; by default its host name");
+                 "The name of this host for the others; by default its host name")
+      ->type_name("NAME");
   app.add_option(
-      "--interface", options.network.interfaces,
-      "A network interface, by name or IPv4 address (repeatable); without it nothing leaves "
-      "this machine");
+         "--interface", options.network.interfaces,
+         "A network interface, by name or IPv4 address (repeatable); without it nothing leaves "
+         "this machine")
+      ->type_name("NAME|ADDRESS");
   app.add_option("--peer", options.network.peers,
                  "The address of a host that multicast does not reach (repeatable); it needs an "
-                 "--interface");
-  app.add_option("--domain", options.network.domain, "The domain of DDS, the same on all hosts")
-      ->check(CLI::Range(0U, kMaxDomain))
-      ->capture_default_str();
+                 "--interface")
+      ->type_name("ADDRESS");
+  app.add_option("--domain", options.network.domain,
+                 "The domain of DDS, the same on all hosts (default " +
+                     std::to_string(options.network.domain) + ")")
+      ->type_name("N")
+      ->check(command_line::whole_number_between(0, kMaxDomain));
   app.add_option(
          "--security", options.network.security,
          "A folder with the keys for DDS Security: HOST.pem, HOST_key.pem, identity_ca.pem, "
          "permissions_ca.pem, governance.p7s, permissions.p7s")
-      ->check(CLI::ExistingDirectory);
+      ->type_name("FOLDER")
+      ->check(CLI::Validator(CLI::ExistingDirectory).description(""));
   app.add_option("--max-age", max_age,
                  "How old a sample may be when it arrives, such as 100ms: where T is forever, or "
                  "longer than that; by default T, or for forever the model's timeout")
@@ -144,6 +153,7 @@ void CommandLine::describe(CLI::App& app) {
   app.footer(
       "Example:\n  arbiter-link --interface eth0\n\n"
       "Exit codes: 0 ended by SIGINT or SIGTERM; 1 an error; 2 wrong use");
+  command_line::refuse_empty(app, {"--interface"});  // require_interfaces() has its own words
   app.failure_message(command_line::wrong_use_text);
 }
 
@@ -203,6 +213,7 @@ int run(int argc, char** argv) {
 }  // namespace arbiter::link
 
 int main(int argc, char** argv) {
+  if (!arbiter::command_line::open_standard_streams()) return 1;
   try {
     return arbiter::link::run(argc, argv);
   } catch (const std::exception& error) {

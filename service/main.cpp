@@ -15,6 +15,8 @@
 
 #include <CLI/CLI.hpp>
 
+#include "command_line/standard_streams.hpp"
+#include "command_line/values.hpp"
 #include "command_line/wrong_use.hpp"
 #include "logging/journal.hpp"
 #include "logging/log_writer.hpp"
@@ -101,8 +103,7 @@ int check(const arbiter::service::DaemonOptions& options) {
       read_files(options.models, gate, {options.steps, progress.watch(), options.is_strict},
                  std::stop_token{});
   if (reading.findings.has_errors()) {
-    log::error("the files have errors, listed above{}",
-               options.is_strict ? "; --strict treats warnings as errors" : "");
+    log::error("{}", reading.findings.why_refused());
     return 1;
   }
   log::info("a daemon can start with these files: {}, {}",
@@ -171,21 +172,21 @@ void CommandLine::describe(CLI::App& app) {
       ->type_name("NAME");
   app.add_option("--user-share", options.user_share,
                  "The percentage of names, clients, descriptors and unread messages that one user "
-                 "may have, of what the others have left")
+                 "may have, of what the others have left (default " +
+                     std::to_string(options.user_share) + ")")
       ->type_name("PERCENT")
-      ->check(CLI::Range(1u, 99u))
-      ->capture_default_str();
+      ->check(arbiter::command_line::whole_number_between(1, 99));
   app.add_flag("--descriptor-store", options.uses_descriptor_store,
                "Leave descriptors with the service manager for the next daemon");
   app.add_option("--effort", effort,
                  "Allow the proof of a model this many times the usual number of steps")
       ->type_name("FACTOR")
-      ->check(CLI::Range(arbiter::rules::Budget::kLeastEffort, arbiter::rules::Budget::kMostEffort))
-      ->check([](const std::string& text) {  // which the range lets pass
-        return text.find_first_of("nN") == std::string::npos ? "" : "it is no number";
-      });
-  app.add_option("--log-level", level, "trace, debug, info, warn or error")
-      ->check(CLI::IsMember({"trace", "debug", "info", "warn", "error"}));
+      ->check(arbiter::command_line::number_between(arbiter::rules::Budget::kLeastEffort,
+                                                    arbiter::rules::Budget::kMostEffort));
+  app.add_option("--log-level", level, "trace, debug, info (default), warn or error")
+      ->type_name("LEVEL")
+      ->check(arbiter::command_line::one_of({"trace", "debug", "info", "warn", "error"}));
+  arbiter::command_line::refuse_empty(app);
   app.failure_message(arbiter::command_line::wrong_use_text);
 }
 
@@ -229,6 +230,7 @@ int run(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  if (!arbiter::command_line::open_standard_streams()) return 1;
   try {
     const int exit_code = run(argc, argv);
     if (arbiter::service::Compiler::has_left_a_thread()) std::_Exit(exit_code);

@@ -13,6 +13,8 @@
 
 #include <CLI/CLI.hpp>
 
+#include "command_line/standard_streams.hpp"
+#include "command_line/values.hpp"
 #include "command_line/wrong_use.hpp"
 #include "gateway/core/kept_files.hpp"
 #include "gateway/core/reload.hpp"
@@ -297,6 +299,7 @@ int run(int argc, char** argv, const ProgramKind& kind, const MakeMiddleware& ma
       ->type_name("FILE");
   app.add_flag("--worker", arguments.is_worker)->group("");
   app.add_option("--files", arguments.files)->group("");
+  command_line::refuse_empty(app);
   app.footer(kind.more + kExitCodes);
   app.failure_message(command_line::wrong_use_text);
   try {
@@ -329,6 +332,7 @@ int run(int argc, char** argv, const ProgramKind& kind, const MakeMiddleware& ma
 }  // namespace
 
 int run_program(int argc, char** argv, const ProgramKind& kind, const MakeMiddleware& make) {
+  if (!command_line::open_standard_streams()) return 1;
   set_program_name(kind.name);
   shm::raise_descriptor_limit(kMostDescriptors);
   try {

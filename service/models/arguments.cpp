@@ -21,8 +21,8 @@ Given given_by(const std::string& argument) {
                                 "\" is no name for a model: use at most " +
                                 std::to_string(kMaxModelName) +
                                 " letters, digits, '_', '.' and '-', not beginning with '-'; where "
-                                "this is the name of a file, write: ./" +
-                                argument);
+                                "this is the name of a file, write: './" +
+                                argument + "'");
   }
   if (equals + 1 == argument.size()) {
     throw std::invalid_argument("\"" + argument + "\" names no file; write: " + argument + "FILE");

@@ -11,6 +11,7 @@
 #include <arbiter/arbiter.hpp>
 
 #include "tests/cli/arbiter_program.hpp"
+#include "tests/support/await.hpp"
 #include "tests/support/child_process.hpp"
 #include "tests/support/daemon.hpp"
 #include "tests/support/raw_publisher.hpp"
@@ -192,11 +193,14 @@ TEST(Echo, TellsTheRate) {
     ASSERT_EQ(result.exit_code, 0) << result.err;
     all = objects(result.out);
     ASSERT_LE(all.size(), 2u);
-  } while (all.size() < 2 || all[0]["samples"] == 0 || all[1]["samples"] == 0);
+  } while (all.size() < 2 || all[0]["samples"] < 3 || all[1]["samples"] < 3);
   for (const json& each : all) {
     EXPECT_GT(each["samples"], 0);
     EXPECT_GT(each["hz"], 0);
+    EXPECT_TRUE(each["jitter_ns"].is_number_integer());
     EXPECT_GE(each["jitter_ns"], 0);
+    EXPECT_TRUE(each["longest_ns"].is_number_integer());
+    EXPECT_GT(each["longest_ns"], 0);
     const double bytes = each["bytes_per_second"];
     EXPECT_NEAR(bytes, 4 * each["hz"].get<double>(), bytes / 1000);
   }
@@ -207,6 +211,62 @@ TEST(Echo, TellsTheRate) {
     out = result.out;
   } while (out.find("/low  ") == std::string::npos);
   EXPECT_THAT(out, AllOf(HasSubstr(" Hz  jitter "), HasSubstr("B/s\n")));
+}
+
+// Of a source that is seen, of which nothing is accepted: there is no port.
+TEST(Echo, TellsNoTimesOfASourceThatSendsNothing) {
+  Daemon daemon(kOverrideModel);
+  Node node("test");
+  auto low = node.output_port<std::uint32_t>("/low");
+  const std::string path = daemon.directory() + "/out";
+  for (const bool is_json : {false, true}) {
+    std::string text;
+    while (text.empty()) {  // on a busy machine nothing may be seen within that time
+      std::vector<std::string> arguments{
+          ARBITER_PROGRAMS "/arbiter", "echo", "/p", "--rate", "--for", "30ms"};
+      if (is_json) arguments.emplace_back("--json");
+      const shm::FileDescriptor out(::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600));
+      ChildProcess program(arguments, {}, {-1, out.get(), -1});
+      pollfd end{program.descriptor(), POLLIN, 0};
+      while (::poll(&end, 1, 1) == 0) low.publish(7U);
+      EXPECT_EQ(program.wait(), 0);
+      text = content_of(path);
+    }
+    if (!is_json) {
+      EXPECT_EQ(text, "/low  0.0 Hz  jitter -  longest -  0 B/s\n");
+      continue;
+    }
+    const json line = json::parse(text);
+    EXPECT_EQ(line["samples"], 0);
+    EXPECT_TRUE(line["jitter_ns"].is_null());
+    EXPECT_TRUE(line["longest_ns"].is_null());
+  }
+}
+
+TEST(Echo, SaysWhatBecomesOfTheDaemonAndOfThePortInAnotherModel) {
+  Daemon daemon(kOverrideModel);
+  const std::string path = daemon.directory() + "/err";
+  for (const char* way : {"--losers", "--rate", "--as-component"}) {
+    const shm::FileDescriptor err(::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600));
+    const ChildProcess program({ARBITER_PROGRAMS "/arbiter", "echo", "/p", way}, {},
+                               {-1, -1, err.get()});
+    const auto said = [&](const char* text) {
+      return content_of(path).find(text) != std::string::npos;
+    };
+    const bool is_component = way == std::string("--as-component");
+    await([&] { return is_component ? daemon.input("/p")["open"] == true : said("waiting"); });
+    daemon.load("<behaviors><arbiter at='/q'><select from='/low'/></arbiter></behaviors>");
+    await([&] { return said("which is in force now, does not mention /p\n"); });
+    daemon.kill();
+    await([&] {
+      return said(
+          "the daemon has gone; its last decisions stay in force, and arbiter "
+          "keeps watching them\n");
+    });
+    daemon.restart();
+    await([&] { return said("a daemon is there again\n"); });
+    daemon.load(kOverrideModel);
+  }
 }
 
 TEST(Echo, AsAComponentTakesThePort) {

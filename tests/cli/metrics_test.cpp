@@ -153,6 +153,7 @@ TEST(MetricsServer, FollowsTheDaemonsThatComeAndGo) {
   EXPECT_THAT(served.error(), HasSubstr("no arbiterd of instance"));
   daemon.restart();
   await([&] { return is_up() == 1; });
+  EXPECT_THAT(served.error(), testing::EndsWith("\narbiter: the daemon answers again\n"));
   served.process().signal(SIGTERM);
   EXPECT_EQ(served.process().wait(), 0);
 }

@@ -237,7 +237,7 @@ TEST(Program, TakesMinutesWhereverItTakesATime) {
   const TemporaryDirectory directory;
   const std::vector<std::vector<std::string>> timed = {
       {"echo", "/p", "--for", "5min"},
-      {"wait", "--until", "idle(/p)", "--timeout", "5min", "--for", "1min"},
+      {"wait", "--until", "idle(/p)", "--for", "1min"},
       {"winners", "--every", "5min"},
       {"record", "--duration", "5min", "-o", directory.path() + "/r.mcap"}};
   for (auto arguments : timed) {
@@ -245,6 +245,8 @@ TEST(Program, TakesMinutesWhereverItTakesATime) {
     const auto result = arbiter(arguments);
     EXPECT_THAT(result.err, HasSubstr("no arbiterd of instance")) << arguments.front();
   }
+  EXPECT_THAT(arbiter({"wait", "--until", "idle(/p)", "--timeout", "5min", "--for", "301s"}).err,
+              HasSubstr("--for 301s is longer than --timeout 5min"));
   EXPECT_THAT(arbiter({"echo", "/p", "--for", "0.5min"}).err, HasSubstr("write 30s in its place"));
   EXPECT_THAT(arbiter({"echo", "/p", "--for", "0min"}).err, HasSubstr("\"0min\" is zero"));
 }

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <string>
 
 #include <arbiter/arbiter.hpp>
@@ -46,6 +47,60 @@ TEST(RecordedIncident, HasNothingToCompareWhereNothingArrived) {
   const auto result = simulated(file);
   EXPECT_EQ(result.exit_code, 1);
   EXPECT_THAT(result.out, HasSubstr("nothing to compare: nothing arrived while it was recorded\n"));
+}
+
+TEST(ReplayOfNothing, SaysWhatTheRecordingHas) {
+  Daemon daemon(kLasting);
+  const std::string idle = daemon.directory() + "/idle.mcap";
+  ASSERT_EQ(arbiter({"record", "-o", idle, "--duration", "20ms"}).exit_code, 0);
+  auto result = arbiter({"replay", idle});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_EQ(result.err, "arbiter: " + idle + ": nothing arrived while it was recorded\n");
+
+  Node node("test");
+  auto low = node.output_port<int>("/low");
+  auto high = node.output_port<int>("/high");
+  Recording recording(daemon);
+  low.publish(1);
+  high.publish(1);
+  EXPECT_EQ(recording.end(), 0);
+  result = arbiter({"replay", recording.file(), "--source", "/X*", "--source", "/y"});
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_THAT(result.err, HasSubstr("--source '/X*', /y matches no source in " + recording.file() +
+                                    "; it has /high and /low\n"));
+  result = arbiter({"replay", recording.file(), "--source", "/low", "--port", "/no-such"});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(result.err, HasSubstr("has no arrival of what you have chosen; it has /high and "
+                                    "/low\n"));
+}
+
+TEST(ReplayThatIsInterrupted, SaysThatItWasStopped) {
+  Daemon daemon(kLasting);
+  std::string file;
+  {
+    Node node("test");
+    auto low = node.output_port<int>("/low");
+    Recording recording(daemon, {"--payloads", "all"});
+    low.publish(1);
+    ::poll(nullptr, 0, 200);  // of which the replay makes ten seconds
+    low.publish(2);
+    EXPECT_EQ(recording.end(), 0);
+    file = recording.file();
+  }
+  Node node("watcher");
+  auto tap = node.tap("/low");
+  const std::string path = daemon.directory() + "/replay.out";
+  const shm::FileDescriptor out(::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600));
+  ChildProcess replay({ARBITER_PROGRAMS "/arbiter", "replay", file, "--speed", "0.02"}, {},
+                      {-1, out.get(), -1});
+  bool has_begun = false;
+  while (!has_begun) {
+    const auto event = tap.wait_for(std::chrono::hours(1));
+    has_begun = event && event->kind() == TapEventKind::sample;
+  }
+  replay.signal(SIGINT);
+  EXPECT_EQ(replay.wait(), 128 + SIGINT);
+  EXPECT_THAT(content_of(path), testing::StartsWith("stopped before the end: 1 sample, "));
 }
 
 // One decision becomes blind, and the instance's name an attempt on the terminal.

@@ -23,18 +23,32 @@ ProgramResult wait_until(const std::string& condition, std::vector<std::string> 
   return arbiter(more);
 }
 
-// One that waits beside the test, and has looked.
+// One that waits beside the test, and has said `first`.
 class Waiting {
  public:
-  Waiting(const Daemon& daemon, const std::string& condition)
+  struct How {
+    std::vector<std::string> more{};  // arguments
+    std::string first{kHasLooked};
+    std::vector<std::string> by{};  // a program that is given the command line to execute
+  };
+
+  Waiting(const Daemon& daemon, const std::string& condition) : Waiting(daemon, condition, How()) {}
+  Waiting(const Daemon& daemon, const std::string& condition, const How& how)
       : err_(daemon.directory() + "/wait.err") {
     const shm::FileDescriptor err(
         ::open(err_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600));
     // It warns of the pattern once it knows the names.
-    process_ = ChildProcess({std::string(ARBITER_PROGRAMS) + "/arbiter", "wait", "--until",
-                             condition + " and none(/no-such-source*)"},
-                            {}, {-1, -1, err.get()});
-    see("matches-nothing");
+    std::vector<std::string> argv = how.by;
+    argv.insert(argv.end(), {std::string(ARBITER_PROGRAMS) + "/arbiter", "wait", "--until",
+                             condition + " and none(/no-such-source*)"});
+    argv.insert(argv.end(), how.more.begin(), how.more.end());
+    process_ = ChildProcess(argv, {}, {-1, -1, err.get()});
+    see(how.first);
+  }
+  void signal(int number) const { process_.signal(number); }
+  [[nodiscard]] bool has_ended() const {
+    pollfd ended{process_.descriptor(), POLLIN, 0};
+    return ::poll(&ended, 1, 0) == 1;
   }
   int exit_code() { return process_.wait(); }
   [[nodiscard]] std::string error() const { return content_of(err_); }
@@ -46,6 +60,8 @@ class Waiting {
       throw std::runtime_error("it has ended: " + error());
     }
   }
+
+  static constexpr const char* kHasLooked = "matches-nothing";
 
  private:
   const std::string err_;
@@ -118,9 +134,65 @@ TEST(Wait, ForATimeCountsFromWhenTheConditionBecameTrue) {
   auto result = wait_until("idle(/gaze)", {"--for", "40ms", "--json"});
   EXPECT_EQ(result.exit_code, 0);
   EXPECT_GE(json::parse(result.out)["waited_ns"], 40'000'000);
-  result = wait_until("idle(/gaze)", {"--for", "3600s", "--timeout", "1ms"});
+  Node node("test");
+  auto face = node.output_port<int>("/face");
+  for (std::string said;
+       said.find("holds, but has not done so for 0.020 s") == std::string::npos;) {
+    Waiting waiting(daemon, "/face", {.more = {"--for", "20ms", "--timeout", "20ms"}});
+    while (!waiting.has_ended()) {  // which the last look may find either way
+      face.signal();
+      face.deactivate();
+    }
+    waiting.exit_code();
+    said = waiting.error();
+  }
+}
+
+TEST(Wait, ForATimeThatIsLongerThanItsTimeoutIsRefused) {
+  const auto result = wait_until("/face", {"--for", "3s", "--timeout", "1s"});
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_THAT(result.err,
+              HasSubstr("--for 3s is longer than --timeout 1s, so it could never be true\n"));
+}
+
+// A shell that starts it with `&` in a script has it ignore SIGINT.
+TEST(Wait, IsStoppedBySigintThoughItWasStartedToIgnoreIt) {
+  Daemon daemon(kGazeModel);
+  Waiting waiting(daemon, "/face", {.by = {"/bin/sh", "-c", "trap '' INT; exec \"$@\"", "sh"}});
+  waiting.signal(SIGINT);
+  waiting.signal(SIGTERM);  // of both, the first in number is read first
+  EXPECT_EQ(waiting.exit_code(), 128 + SIGINT);
+}
+
+TEST(Wait, WithATimeoutWaitsForADaemonAsWell) {
+  Daemon daemon(kGazeModel);
+  daemon.kill();
+  const Waiting::How how{.more = {"--timeout", "3600s"}, .first = "answers yet; waiting for one"};
+  {
+    Waiting waiting(daemon, "/face", how);
+    waiting.signal(SIGTERM);
+    EXPECT_EQ(waiting.exit_code(), 128 + SIGTERM);
+  }
+  Waiting waiting(daemon, "/face", how);
+  daemon.restart();
+  waiting.see(Waiting::kHasLooked);
+  Node node("test");
+  auto face = node.output_port<int>("/face");
+  face.signal();
+  EXPECT_EQ(waiting.exit_code(), 0);
+}
+
+TEST(Wait, SaysThatAWinnerIsSelectedThatCannotDeliver) {
+  Daemon daemon(kGazeModel);
+  Node sender("sender");
+  Node receiver("receiver");
+  auto gaze = receiver.input_port<int>("/gaze");
+  auto face = sender.output_port<double>("/face");
+  face.signal();
+  const auto result = wait_until("idle(/gaze)", {"--timeout", "0s"});
   EXPECT_EQ(result.exit_code, kTimedOut);
-  EXPECT_THAT(result.err, HasSubstr("holds, but has not done so for 3600.000 s"));
+  EXPECT_THAT(result.err,
+              HasSubstr("  /face is selected at /gaze, but cannot deliver  (arbiter why /gaze)\n"));
 }
 
 TEST(Wait, GoesOnWhileNoDaemonRunsAndWithTheNextOne) {
@@ -175,9 +247,12 @@ TEST(Wait, WithoutADaemonOrWithAConditionThatCannotBeReadIsAnError) {
     EXPECT_EQ(wait_until("/face", {"--for", "-1s"}).exit_code, 2);
     EXPECT_EQ(arbiter({"wait"}).exit_code, 2);
   }
-  const auto result = wait_until("/face", {"--instance", "nobody-has-this-instance"});
+  auto result = wait_until("/face", {"--instance", "nobody-has-this-instance"});
   EXPECT_EQ(result.exit_code, 1);
   EXPECT_THAT(result.err, HasSubstr("no arbiterd of instance"));
+  result = wait_until("/face", {"--instance", "nobody-has-this-instance", "--timeout", "1ms"});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(result.err, HasSubstr("arbiter: timed out after 0.001 s: no arbiterd of instance"));
 }
 
 }  // namespace

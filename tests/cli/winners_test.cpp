@@ -171,6 +171,20 @@ TEST_F(Winners, OfAPatternThatMatchesNothingAreNoneAndItSaysSo) {
   EXPECT_EQ(program_.wait(), 0);
 }
 
+TEST_F(Winners, OfAPortThatAnotherModelDoesNotArbitrateAreSaidToBeNone) {
+  random_.signal();
+  start({"--port", "/gaze:i"});
+  repetition();
+  daemon_.load(R"(<behaviors timeout="forever">
+<behavior name="Tell"><config at="/news">/arbiter/winner/gaze:i:o</config></behavior>
+</behaviors>)");
+  await([&] {
+    return content_of(err_path())
+               .find("--port /gaze:i matches no input port that the model in force arbitrates") !=
+           std::string::npos;
+  });
+}
+
 TEST(WinnersWithoutADaemon, AreNone) {
   const auto result = arbiter({"winners", "--instance", "nobody-has-this"});
   EXPECT_EQ(result.exit_code, 1);

@@ -34,9 +34,8 @@ TEST(Program, SaysWhichArgumentItDoesNotKnowAndWhatWasMeant) {
             "Run `arbiter why --help` for more information.\n");
   EXPECT_THAT(error({"recording", "winers", "x.mcap"}),
               HasSubstr("arbiter recording has no verb \"winers\"; did you mean \"winners\"?"));
-  EXPECT_THAT(
-      error({"recording"}),
-      HasSubstr("arbiter recording needs a verb: info, repair, export, winners and sample"));
+  EXPECT_THAT(error({"recording"}),
+              HasSubstr("arbiter recording needs a verb: info, repair, export, winners or sample"));
   EXPECT_THAT(error({"recording", "winners", "x.mcap", "--prot", "/a"}),
               HasSubstr("arbiter recording winners has no option \"--prot\"; did you mean "
                         "\"--port\"?"));
@@ -99,6 +98,55 @@ TEST(Program, TellsTheBoundsOfNumbersShortly) {
     EXPECT_EQ(result.exit_code, 2);
     EXPECT_THAT(result.err, HasSubstr("is not a whole number of at least 1\n"));
   }
+}
+
+// What a script writes where a variable is not set.
+TEST(Program, RefusesWhatIsEmpty) {
+  const auto error = [](const std::vector<std::string>& arguments) {
+    const auto result = arbiter(arguments);
+    EXPECT_EQ(result.exit_code, 2) << arguments.front();
+    return result.err.substr(0, result.err.find('\n'));
+  };
+  EXPECT_EQ(error({"metrics", "--listen", ""}),
+            "--listen: is empty; write ADDRESS, or leave it out");
+  EXPECT_EQ(error({"winners", "--port", ""}), "--port: is empty; write PATTERN, or leave it out");
+  EXPECT_EQ(error({"stop", "--instance", ""}), "--instance: is empty; write NAME, or leave it out");
+  EXPECT_EQ(error({"record", "-o", ""}), "--output: is empty; write a value");
+  EXPECT_EQ(error({"switch", ""}), "NAME: is empty; write a value, or leave it out");
+  EXPECT_EQ(error({"recording", "info", ""}), "FILE: is empty; write a value");
+  EXPECT_EQ(error({"why", ""}), "PORT: is empty; write a port's name, such as /Arm/pos:o");
+  EXPECT_EQ(error({"echo", ""}), "PORT: the name is empty; echo takes one port");
+  EXPECT_EQ(error({"metrics", "--listen="}), "--listen needs a value; write: --listen ADDRESS");
+  EXPECT_EQ(error({"check", "m.xml", "--silence"}),
+            "--silence needs a value; write: --silence CODE");
+  for (const char* option : {"--text", "--hex"}) {
+    const auto result =
+        arbiter({"pub", "/p", option, "", "--instance", "nobody-has-this-instance"});
+    EXPECT_THAT(result.err, HasSubstr("no arbiterd of instance")) << "a sample of no bytes";
+  }
+}
+
+TEST(Program, SaysInWordsWhichValuesThereAre) {
+  const auto error = [](const std::vector<std::string>& arguments) {
+    const auto result = arbiter(arguments);
+    EXPECT_EQ(result.exit_code, 2) << arguments.front();
+    return result.err.substr(0, result.err.find('\n'));
+  };
+  EXPECT_EQ(error({"pub", "/p", "--size", "-1"}),
+            "--size: \"-1\" is not a whole number from 0 to 1073741824");
+  EXPECT_EQ(error({"record", "-o", "x.mcap", "--compression", "gzip"}),
+            "--compression: \"gzip\" is not zstd, lz4 or none");
+  EXPECT_EQ(error({"graph", "m.xml", "--view", "all"}),
+            "--view: \"all\" is not auto, behaviours, connections or both");
+  EXPECT_EQ(error({"winners", "--every", "1ms"}), "--every: must be at least 2ms");
+  EXPECT_EQ(error({"top", "--interval", "1ms"}), "--interval: must be 20ms to 60s");
+  EXPECT_EQ(error({"why", "In:i"}),
+            "PORT: a port's name begins with '/'; write \"/In:i\" for \"In:i\"");
+}
+
+TEST(Program, SaysOfNoDaemonOnlyWhereItNeedsOne) {
+  EXPECT_THAT(arbiter({"rules", "--help"}).out, Not(HasSubstr("daemon")));
+  EXPECT_THAT(arbiter({"history", "--help"}).out, HasSubstr("or no daemon"));
 }
 
 TEST(Program, SaysThatOptionsGoAfterTheVerb) {
