@@ -267,9 +267,9 @@ void add_wait(CLI::App& app, int& exit_code) {
       "idle(PORT), and, or, not, implies, iff, any(GLOB), all(GLOB) and none(GLOB) are as in\n"
       "statements. A change is seen within about 2 ms. One that lasts for less may be missed.\n\n"
       "Exit codes: 0 the condition is true; 1 no daemon (with --timeout, none has come by then), "
-      "you "
-      "may\nnot observe, or the model in force does not have a name of the condition; 2 wrong use, "
-      "or a\ncondition that cannot be read; 3 timed out; 130 stopped by Ctrl-C (143 by SIGTERM)");
+      "you may\nnot observe, or the model in force does not have a name of the condition; 2 wrong "
+      "use, or a\ncondition that cannot be read; 3 timed out; 130 stopped by Ctrl-C (143 by "
+      "SIGTERM)");
   verb->callback([options, &exit_code] { exit_code = wait(*options); });
 }
 

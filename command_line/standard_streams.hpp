@@ -4,6 +4,8 @@
 #include <fcntl.h>
 #include <unistd.h>
 
+#include <initializer_list>
+
 namespace arbiter::command_line {
 
 // The first that main() calls. A stream that is closed leads nowhere from then on: otherwise its

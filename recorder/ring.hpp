@@ -80,7 +80,7 @@ class Ring : public Sink {
   void sum_up(const Record& record);
   [[nodiscard]] bool is_resting(Cause cause, Nanoseconds now) const;
   void dump(Cause cause, std::vector<std::uint64_t> requests);
-  std::string write_file(Cause cause) const;
+  [[nodiscard]] std::string write_file(Cause cause) const;
   void write_records(evidence::RecordWriter& writer) const;
   void write_base(evidence::RecordWriter& writer) const;
   [[nodiscard]] std::string give_name(const std::string& written, Cause cause,

@@ -12,6 +12,7 @@
 #include <exception>
 #include <utility>
 
+#include "client/node/ended_nodes.hpp"
 #include "client/node/names.hpp"
 #include "client/types.hpp"
 #include "wire/call.hpp"
