@@ -108,6 +108,7 @@ class Daemon final : private Takeover::Host {
   void turn_away_client();
   void leave_listener_alone();
   void drop(ClientId id) override;
+  void close_all(Client& client) override;
   void log_end_of(const Client& client, bool is_away);
   void drop_oldest_silent_client();
   void look_in_flight(shm::Nanoseconds now);

@@ -153,6 +153,12 @@ void Daemon::close_port(const Client& client, shm::PortInstance port) {
   remove_port(port);
 }
 
+// Nor is anything kept that it has asked for and did not wait for.
+void Daemon::close_all(Client& client) {
+  client.comes_back = false;
+  while (!client.ports.empty()) close_port(client, *client.ports.begin());
+}
+
 // A tap is told by those whom it taps, before its program is told that it is open.
 void Daemon::open_tap(Client& client, wire::Received& received) {
   const std::string name = port_name(received.message);

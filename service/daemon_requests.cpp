@@ -125,11 +125,7 @@ void Daemon::handle(Client& client, wire::Received& received) {
       connect(client, message.request, message.port);
       break;
     case wire::MessageKind::kNodeEnded:
-      if (message.link == client.node) {
-        // It ends: nothing is kept for it, not even what it asked for and did not wait for.
-        client.comes_back = false;
-        while (!client.ports.empty()) close_port(client, *client.ports.begin());
-      }
+      if (message.link == client.node) close_all(client);
       takeover_.forget_ended(client, message.link);
       break;
     case wire::MessageKind::kStop:

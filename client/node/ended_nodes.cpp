@@ -1,11 +1,12 @@
 #include "client/node/ended_nodes.hpp"
 
+#include <pthread.h>
+
+#include <algorithm>
 #include <atomic>
 #include <deque>
 #include <exception>
 #include <mutex>
-
-#include "shm/descendants.hpp"
 
 namespace arbiter::detail {
 namespace {
@@ -15,12 +16,13 @@ constexpr std::size_t kMostEnded = 65536;
 struct EndedNode {
   shm::SegmentIdentity board;
   std::uint64_t node = 0;
+  std::weak_ptr<const ServiceBell> teller;  // whose node says it
 };
 
-// A child has closed its parent's.
 struct RingingBell {
   std::weak_ptr<const ServiceBell> bell;
-  shm::ProcessMark process;
+  shm::SegmentIdentity board;
+  bool has_thread = false;
 };
 
 std::mutex ended_mutex;  // of the next two
@@ -28,17 +30,45 @@ std::deque<EndedNode> ended_nodes;
 std::vector<RingingBell> ringing_bells;
 std::atomic<std::size_t> ended_count{0};  // of them
 
+// Another thread may hold the mutex at a fork, and the bells are the parent's.
+void begin_anew_in_children() {
+  static const int error = pthread_atfork([] { ended_mutex.lock(); }, [] { ended_mutex.unlock(); },
+                                          [] {
+                                            ended_nodes.clear();
+                                            ringing_bells.clear();
+                                            ended_count.store(0, std::memory_order_relaxed);
+                                            ended_mutex.unlock();
+                                          });
+  static_cast<void>(error);
+}
+
+// Under the mutex. Null: no other node has that memory.
+std::shared_ptr<const ServiceBell> teller_for(const shm::SegmentIdentity& board,
+                                              const ServiceBell* own) {
+  std::shared_ptr<const ServiceBell> found;
+  for (const RingingBell& each : ringing_bells) {
+    if (!(each.board == board)) continue;
+    auto bell = each.bell.lock();
+    if (bell == nullptr || bell.get() == own) continue;
+    if (each.has_thread) return bell;
+    if (found == nullptr) found = std::move(bell);
+  }
+  return found;
+}
+
 }  // namespace
 
-void remember_ended(const shm::SegmentIdentity& board, std::uint64_t node) noexcept try {
-  const std::lock_guard lock(ended_mutex);
-  if (ended_nodes.size() == kMostEnded) ended_nodes.pop_front();
-  ended_nodes.push_back({board, node});
-  ended_count.store(ended_nodes.size(), std::memory_order_relaxed);
-  for (const RingingBell& each : ringing_bells) {
-    const auto bell = each.process.is_here() ? each.bell.lock() : nullptr;
-    if (bell != nullptr) bell->ring();
+void remember_ended(const shm::SegmentIdentity& board, std::uint64_t node,
+                    const ServiceBell* own) noexcept try {
+  std::shared_ptr<const ServiceBell> teller;
+  {
+    const std::lock_guard lock(ended_mutex);
+    teller = teller_for(board, own);
+    if (ended_nodes.size() == kMostEnded) ended_nodes.pop_front();
+    ended_nodes.push_back({board, node, teller});
+    ended_count.store(ended_nodes.size(), std::memory_order_relaxed);
   }
+  if (teller != nullptr) teller->ring();
 } catch (const std::exception&) {  // no memory: its name is kept until the process ends
 }
 
@@ -53,6 +83,19 @@ std::vector<std::uint64_t> ended_in(const shm::SegmentIdentity& board) {
   return nodes;
 }
 
+std::vector<std::uint64_t> ended_to_tell(const shm::SegmentIdentity& board,
+                                         const std::shared_ptr<const ServiceBell>& bell) {
+  std::vector<std::uint64_t> nodes;
+  const std::lock_guard lock(ended_mutex);
+  for (EndedNode& each : ended_nodes) {
+    if (!(each.board == board)) continue;
+    const auto teller = each.teller.lock();
+    if (teller == nullptr) each.teller = bell;
+    if (teller == nullptr || teller == bell) nodes.push_back(each.node);
+  }
+  return nodes;
+}
+
 void forget_ended(const shm::SegmentIdentity& board,
                   const std::set<std::uint64_t>& nodes) noexcept {
   const std::lock_guard lock(ended_mutex);
@@ -62,10 +105,18 @@ void forget_ended(const shm::SegmentIdentity& board,
   ended_count.store(ended_nodes.size(), std::memory_order_relaxed);
 }
 
-void ring_for_ended(const std::shared_ptr<const ServiceBell>& bell) {
-  const std::lock_guard lock(ended_mutex);
-  std::erase_if(ringing_bells, [](const RingingBell& each) { return each.bell.expired(); });
-  ringing_bells.push_back({bell, shm::ProcessMark::of_this_process()});
+void ring_for_ended(const std::shared_ptr<const ServiceBell>& bell,
+                    const shm::SegmentIdentity& board, bool has_thread) {
+  begin_anew_in_children();
+  {
+    const std::lock_guard lock(ended_mutex);
+    std::erase_if(ringing_bells, [&](const RingingBell& each) {
+      const auto known = each.bell.lock();
+      return known == nullptr || known == bell;
+    });
+    ringing_bells.push_back({bell, board, has_thread});
+  }
+  if (has_any_ended()) bell->ring();  // perhaps one that ended when no other node was there
 }
 
 }  // namespace arbiter::detail

@@ -50,6 +50,16 @@ wire::Message message_of(wire::MessageKind kind, std::string_view name = {}) {
   return message;
 }
 
+std::string port_to_open(const wire::Message& question) {
+  if (question.kind == wire::MessageKind::kOpenOutput) {
+    return "output " + std::string(question.name_view());
+  }
+  if (question.kind == wire::MessageKind::kOpenInput) {
+    return "input " + std::string(question.name_view());
+  }
+  return {};
+}
+
 }  // namespace
 
 NodeCore::NodeCore(std::string_view name, const NodeOptions& options)
@@ -105,7 +115,7 @@ void NodeCore::connect() {
       epoll_ctl(epoll_.get(), EPOLL_CTL_ADD, timer_.get(), &event) != 0 || !watch_socket()) {
     throw Error(std::string("no descriptor for the daemon's messages: ") + std::strerror(errno));
   }
-  ring_for_ended(service_bell_);
+  ring_for_ended(service_bell_, shm::identity_of(memory_->board()), options_.service_thread);
   note_second_daemons(welcome.directory);
 }
 
@@ -212,7 +222,8 @@ bool NodeCore::wait_for_news(std::unique_lock<std::mutex>& lock, Clock::time_poi
 void NodeCore::give_up_on(std::uint64_t request) {
   const auto unanswered = replies_.extract(request);
   if (unanswered.mapped().asked_in == conversation_ && socket_ != nullptr) {
-    if (!outbox_.withdraw(request)) given_up_.insert(request);
+    const std::string& opens = unanswered.mapped().opens;
+    if (!outbox_.withdraw(request) && !opens.empty()) given_up_.emplace(request, opens);
     if (outbox_.empty()) heed_room(false);
   }
   if (unanswered.mapped().opened != 0) forget_port(unanswered.mapped().opened);
@@ -249,6 +260,7 @@ wire::Received NodeCore::converse(const wire::Message& question,
   const std::uint64_t request = numbered.request = next_request_++;
   Reply& reply = replies_[request];
   reply.on_opened = std::move(on_opened);
+  reply.opens = port_to_open(question);
   while (!reply.finished) {
     if (memory != nullptr && memory != memory_.get()) {
       replies_.erase(request);
@@ -256,8 +268,11 @@ wire::Received NodeCore::converse(const wire::Message& question,
     }
     if (standing_ == Standing::kMember && reply.asked_in != conversation_) {
       reply.asked_in = conversation_;
-      reply.is_behind_given_up = !given_up_.empty();
-      say_who_has_ended();  // before a name is asked for that is kept for one of them
+      reply.is_behind_given_up =
+          !reply.has_asked_again &&
+          std::any_of(given_up_.begin(), given_up_.end(),
+                      [&](const auto& each) { return each.second == reply.opens; });
+      say_who_has_ended(Whom::kAll);  // before a name is asked for that is kept for one of them
       // A port that another daemon has opened was handed back to this one: what is left is to be
       // connected.
       if (question.kind == wire::MessageKind::kOpenTap) reply.opened = 0;

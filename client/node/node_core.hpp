@@ -86,7 +86,9 @@ class NodeCore : public std::enable_shared_from_this<NodeCore> {
     shm::PortInstance opened = 0;  // kOpened came
     bool finished = false;
     std::uint64_t asked_in = 0;  // the conversation in which the question was asked last
+    std::string opens;           // "output /name": it asks for that port; empty: for none
     bool is_behind_given_up = false;
+    bool has_asked_again = false;  // for that
     std::string refusal;
     wire::Received received;
     std::function<void(wire::Received&)> on_opened;
@@ -186,7 +188,8 @@ class NodeCore : public std::enable_shared_from_this<NodeCore> {
   // Whether the daemon is there, and has read all that we have said.
   [[nodiscard]] bool is_heard() const noexcept;
   // Under mutex_: which nodes of this process have ended.
-  void say_who_has_ended() noexcept;
+  enum class Whom : std::uint8_t { kOwn, kAll };  // kOwn: those that it is to tell of
+  void say_who_has_ended(Whom whom) noexcept;
   void say_ended(std::uint64_t node) noexcept;
 
   [[nodiscard]] Socket socket();
@@ -241,7 +244,7 @@ class NodeCore : public std::enable_shared_from_this<NodeCore> {
   std::uint64_t next_request_ = 1;
   std::map<std::uint64_t, Reply> replies_;
   // What the daemon will answer first, and nobody waits for.
-  std::set<std::uint64_t> given_up_;
+  std::map<std::uint64_t, std::string> given_up_;  // openings, by request: Reply::opens
   std::map<shm::PortInstance, std::shared_ptr<OutputCore>> outputs_;
   std::map<shm::PortInstance, std::shared_ptr<InputCore>> inputs_;
   std::map<shm::PortInstance, std::shared_ptr<TapCore>> taps_;

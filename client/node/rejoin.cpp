@@ -205,6 +205,7 @@ void NodeCore::be_welcomed(wire::Received& welcome) {
       memory_ = std::make_shared<SharedMemory>(std::move(welcome.descriptors[0]),
                                                std::move(welcome.descriptors[1]), service_bell_,
                                                residence());
+      ring_for_ended(service_bell_, shm::identity_of(memory_->board()), options_.service_thread);
     } catch (const std::exception& error) {
       turned_away_ = error.what();
       be_alone(kTurnedAwayInterval);
@@ -215,7 +216,7 @@ void NodeCore::be_welcomed(wire::Received& welcome) {
   ++conversation_;
   node_ = welcome.message.link;
   turned_away_.clear();
-  say_who_has_ended();
+  say_who_has_ended(Whom::kAll);
   for (const auto& [instance, output] : outputs_) output->doubt_taps();
   describe_again();
   reopen_taps();
@@ -228,7 +229,7 @@ bool NodeCore::is_heard() const noexcept {
   return !has_hung_up(*socket_) && ::ioctl(socket_->get(), SIOCOUTQ, &unread) == 0 && unread == 0;
 }
 
-void NodeCore::say_who_has_ended() noexcept {
+void NodeCore::say_who_has_ended(Whom whom) noexcept {
   has_ended_to_tell_ = false;
   if (standing_ != Standing::kMember || socket_ == nullptr || !has_any_ended()) return;
   try {
@@ -239,7 +240,7 @@ void NodeCore::say_who_has_ended() noexcept {
       forget_ended(board, ended_said_);
       ended_said_.clear();
     }
-    const auto ended = ended_in(board);
+    const auto ended = whom == Whom::kAll ? ended_in(board) : ended_to_tell(board, service_bell_);
     for (const std::uint64_t node : ended) {
       // To the next daemon all are said again.
       if (socket_ == nullptr || ended_said_.size() == kMostEndedAtOnce) break;

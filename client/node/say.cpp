@@ -69,7 +69,7 @@ void NodeCore::say_the_end() noexcept {
   }
   if (is_heard()) return;
   try {
-    remember_ended(shm::identity_of(memory_->board()), node_);
+    remember_ended(shm::identity_of(memory_->board()), node_, service_bell_.get());
   } catch (const std::exception&) {  // its memory is there
   }
 }

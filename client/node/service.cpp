@@ -113,7 +113,7 @@ void NodeCore::pump(int timeout_ms) {
   {
     const std::lock_guard lock(mutex_);
     say_what_waits();
-    say_who_has_ended();
+    say_who_has_ended(Whom::kOwn);
     say_descriptions();
   }
   const Socket socket = this->socket();
@@ -202,7 +202,10 @@ void NodeCore::handle_without_descriptors(const wire::Message& message) {
   const bool is_opened = message.kind == wire::MessageKind::kOpened;
   if (is_opened) say_closed(message.port);  // what it is answered ends the wait
   const auto found = replies_.find(message.request);
-  if (found == replies_.end()) return;
+  if (found == replies_.end()) {
+    given_up_.erase(message.request);
+    return;
+  }
   found->second.refusal = why;
   found->second.finished = !is_opened;
   news_.notify_all();
@@ -351,7 +354,8 @@ void NodeCore::handle_reply(wire::Received& received) {
   }
   if (message.kind == wire::MessageKind::kRefused) {
     // Perhaps for a port of ours that an opening before it has got and is to be closed.
-    if (reply.is_behind_given_up) {
+    if (std::exchange(reply.is_behind_given_up, false)) {
+      reply.has_asked_again = true;
       reply.asked_in = 0;
       news_.notify_all();
       return;

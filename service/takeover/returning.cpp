@@ -71,14 +71,18 @@ void Takeover::take_back(Client& client, const wire::Received& hello) {
   host_.welcome(client);
 }
 
-// The conversation that it gave up may not have been seen to end.
-void Takeover::end_conversation_of(const Client& client, NodeId node) {
+Client* Takeover::former_client(const Client& client, NodeId node) {
   const auto former = std::find_if(clients_.begin(), clients_.end(), [&](const auto& each) {
     return each.second->node == node && each.second.get() != &client &&
            each.second->user() == client.user() &&
            client.is_process(each.second->pid(), each.second->process());
   });
-  if (former != clients_.end()) host_.drop(former->first);
+  return former == clients_.end() ? nullptr : former->second.get();
+}
+
+// The conversation that it gave up may not have been seen to end.
+void Takeover::end_conversation_of(const Client& client, NodeId node) {
+  if (const Client* const former = former_client(client, node)) host_.drop(former->id());
 }
 
 // A process goes on by its number when it executes a program that runs as another user; who it was
@@ -225,7 +229,11 @@ void Takeover::give_up(NodeId node) {
 }
 
 void Takeover::forget_ended(const Client& client, NodeId ended) {
-  end_conversation_of(client, ended);
+  // What it said itself may not have been read yet.
+  if (Client* const former = former_client(client, ended)) {
+    host_.close_all(*former);
+    host_.drop(former->id());
+  }
   const auto found = absentees_.find(ended);
   if (found == absentees_.end() || !is_that(client, found->second)) return;
   const std::size_t ports = found->second.ports.size();

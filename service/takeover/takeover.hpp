@@ -47,6 +47,8 @@ class Takeover {
     virtual void watch_absentee(const shm::FileDescriptor& process, NodeId node) = 0;
     // Ends a conversation.
     virtual void drop(ClientId client) = 0;
+    // The client has ended in good order: closes its ports, and keeps nothing for it.
+    virtual void close_all(Client& client) = 0;
     // A client is known from now on, and is to hear so.
     virtual void welcome(Client& client) = 0;
     // Requests that could not be served may be served now.
@@ -145,6 +147,8 @@ class Takeover {
   void take_back(Client& client, const wire::Received& hello);
   void log_end_of(const Absentee& absentee);
   void end_conversation_of(const Client& client, NodeId node);
+  // Of the same process and user; null: there is none.
+  [[nodiscard]] Client* former_client(const Client& client, NodeId node);
   [[nodiscard]] static bool is_that(const Client& client, const Absentee& absentee);
   void give_up(NodeId node);
   [[nodiscard]] shm::Nanoseconds deadline_of_return() const;
