@@ -1,11 +1,13 @@
 // A node: the conversation with the daemon, and the registry of the ports that it concerns.
 //
-//   node_core.cpp     connecting; opening and closing ports; questions and answers
+//   node_core.cpp     connecting; questions and answers
+//   openings.cpp      opening and closing ports and taps
 //   notices.cpp       what the component should know
 //   service.cpp       what the daemon says, and the thread that hears it
 //   links.cpp         what it says of the ports at the other end
 //   say.cpp           what the node says
-//   rejoin.cpp        losing the daemon, and coming back to another; ending without one
+//   ends.cpp          that it has ended, and others of its process (ended_nodes.hpp)
+//   rejoin.cpp        losing the daemon, and coming back to another
 //   descriptions.cpp  what components say of their ports
 //   taps.cpp          taps that this node opens, and taps of its output ports
 //

@@ -3,13 +3,9 @@
 // All that data needs to flow is mapped already, so for the ports nothing changes. The next daemon
 // is handed back the memory that the last one made, and told of each port and its links
 // (service/takeover/takeover.hpp).
-#include <linux/sockios.h>
-#include <poll.h>
 #include <sys/epoll.h>
-#include <sys/ioctl.h>
 #include <sys/timerfd.h>
 
-#include <algorithm>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -37,8 +33,6 @@ namespace {
 constexpr std::chrono::milliseconds kRejoinInterval{50};
 // How long until it is tried again with a daemon that does not want us.
 constexpr std::chrono::milliseconds kTurnedAwayInterval{1000};
-// Of nodes that have ended: the others are said once these have been heard.
-constexpr std::size_t kMostEndedAtOnce = 256;
 
 bool is_sent(const shm::FileDescriptor& socket, const wire::Message& message,
              std::array<int, wire::kMaxDescriptors> descriptors = {-1, -1}) {
@@ -59,11 +53,6 @@ PortAtHand port_at_hand(wire::MessageKind kind, const Core& core, std::uint32_t 
   port.second = shm::duplicate(second.get());
   port.links = core.held_links();
   return port;
-}
-
-bool has_hung_up(const shm::FileDescriptor& socket) {
-  pollfd state{socket.get(), 0, 0};
-  return ::poll(&state, 1, 0) != 0;
 }
 
 bool is_handed_back(const shm::FileDescriptor& socket, const PortAtHand& port) {
@@ -221,34 +210,6 @@ void NodeCore::be_welcomed(wire::Received& welcome) {
   describe_again();
   reopen_taps();
   news_.notify_all();
-}
-
-bool NodeCore::is_heard() const noexcept {
-  if (standing_ != Standing::kMember || socket_ == nullptr || !outbox_.empty()) return false;
-  int unread = 0;  // bytes
-  return !has_hung_up(*socket_) && ::ioctl(socket_->get(), SIOCOUTQ, &unread) == 0 && unread == 0;
-}
-
-void NodeCore::say_who_has_ended(Whom whom) noexcept {
-  has_ended_to_tell_ = false;
-  if (standing_ != Standing::kMember || socket_ == nullptr || !has_any_ended()) return;
-  try {
-    const auto board = shm::identity_of(memory_->board());
-    if (ended_said_in_ != conversation_) ended_said_.clear();
-    ended_said_in_ = conversation_;
-    if (!ended_said_.empty() && is_heard()) {
-      forget_ended(board, ended_said_);
-      ended_said_.clear();
-    }
-    const auto ended = whom == Whom::kAll ? ended_in(board) : ended_to_tell(board, service_bell_);
-    for (const std::uint64_t node : ended) {
-      // To the next daemon all are said again.
-      if (socket_ == nullptr || ended_said_.size() == kMostEndedAtOnce) break;
-      if (ended_said_.insert(node).second) say_ended(node);
-    }
-    has_ended_to_tell_ = !ended.empty();
-  } catch (const std::exception&) {  // no memory: another time
-  }
 }
 
 // The conversation is over; but the daemon may be replaced by one that knows us.
