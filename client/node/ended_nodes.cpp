@@ -2,7 +2,6 @@
 
 #include <pthread.h>
 
-#include <algorithm>
 #include <atomic>
 #include <deque>
 #include <exception>
@@ -28,7 +27,9 @@ struct RingingBell {
 std::mutex ended_mutex;  // of the next two
 std::deque<EndedNode> ended_nodes;
 std::vector<RingingBell> ringing_bells;
-std::atomic<std::size_t> ended_count{0};  // of them
+// Of ended_nodes: whoever holds the mutex writes it. Relaxed, with no partner: it spares others the
+// mutex where there is none, and they read the list itself under the mutex.
+std::atomic<std::size_t> ended_count{0};
 
 // Another thread may hold the mutex at a fork, and the bells are the parent's.
 void begin_anew_in_children() {
@@ -39,7 +40,7 @@ void begin_anew_in_children() {
                                             ended_count.store(0, std::memory_order_relaxed);
                                             ended_mutex.unlock();
                                           });
-  static_cast<void>(error);
+  static_cast<void>(error);  // no memory: as without it
 }
 
 // Under the mutex. Null: no other node has that memory.
@@ -75,12 +76,7 @@ void remember_ended(const shm::SegmentIdentity& board, std::uint64_t node,
 bool has_any_ended() noexcept { return ended_count.load(std::memory_order_relaxed) != 0; }
 
 std::vector<std::uint64_t> ended_in(const shm::SegmentIdentity& board) {
-  std::vector<std::uint64_t> nodes;
-  const std::lock_guard lock(ended_mutex);
-  for (const EndedNode& each : ended_nodes) {
-    if (each.board == board) nodes.push_back(each.node);
-  }
-  return nodes;
+  return ended_to_tell(board, nullptr);
 }
 
 std::vector<std::uint64_t> ended_to_tell(const shm::SegmentIdentity& board,
@@ -89,9 +85,8 @@ std::vector<std::uint64_t> ended_to_tell(const shm::SegmentIdentity& board,
   const std::lock_guard lock(ended_mutex);
   for (EndedNode& each : ended_nodes) {
     if (!(each.board == board)) continue;
-    const auto teller = each.teller.lock();
-    if (teller == nullptr) each.teller = bell;
-    if (teller == nullptr || teller == bell) nodes.push_back(each.node);
+    if (bell != nullptr && each.teller.expired()) each.teller = bell;
+    if (bell == nullptr || each.teller.lock() == bell) nodes.push_back(each.node);
   }
   return nodes;
 }

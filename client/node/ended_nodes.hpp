@@ -21,7 +21,8 @@ namespace arbiter::detail {
 void remember_ended(const shm::SegmentIdentity& board, std::uint64_t node,
                     const ServiceBell* own) noexcept;
 
-// Whether any is remembered. Relaxed is enough: who rings has remembered it before.
+// Whether any is remembered. It may be late by a moment, but not for whoever is rung: a bell is
+// rung by a system call behind the mutex.
 [[nodiscard]] bool has_any_ended() noexcept;
 // Those of that memory. Throws std::bad_alloc.
 [[nodiscard]] std::vector<std::uint64_t> ended_in(const shm::SegmentIdentity& board);

@@ -18,6 +18,8 @@ using Clock = std::chrono::steady_clock;
 
 constexpr std::chrono::milliseconds kPatienceAtEnd{1000};
 constexpr std::chrono::seconds kNoPatienceAfter{10};
+// Written by whoever has waited. Relaxed, with no partner: nothing else is read by it, and who
+// misses it waits once more.
 std::atomic<Clock::duration> last_waited_in_vain{-kNoPatienceAfter};
 
 Clock::duration patience_at_end(Clock::time_point now) {
