@@ -1,6 +1,9 @@
 // What a recorder must know beside the events of taps: which sources there are, which model is in
 // force, what the pages of sources say that nobody tells of, and which ports are open.
 //
+//   watched_models.cpp  which model, and which sources that makes it watch
+//   watcher.cpp         taps, pages, ports; the thread
+//
 // A thread of its own, because it asks the daemon and opens taps, either of which may wait. It puts
 // what it finds into the queue, and hands taps to the thread that polls them.
 #pragma once
