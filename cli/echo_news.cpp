@@ -4,15 +4,11 @@
 #include <iostream>
 #include <optional>
 
-#include "shm/clock.hpp"
-
 namespace arbiter::cli {
 
 EchoNews::EchoNews(std::shared_ptr<watch::Instance> instance, std::string port)
     : instance_(std::move(instance)), port_(std::move(port)) {
-  if (instance_ == nullptr) return;
-  memory_ = instance_->memory();
-  generation_ = memory_->tables().snapshot().generation;
+  if (instance_ != nullptr) models_.note(ModelNews::in_force(*instance_));
 }
 
 void EchoNews::tell() {
@@ -23,21 +19,17 @@ void EchoNews::tell() {
 }
 
 void EchoNews::tell_of_model() {
-  const auto memory = instance_->memory();
-  const std::uint64_t generation = memory->tables().snapshot().generation;
-  const bool is_known = memory == memory_ && generation == generation_;
-  if (is_known || generation == 0 || !instance_->has_daemon()) return;
-  if (shm::monotonic_now() < ask_again_) return;
+  const auto model = models_.unknown(*instance_);
+  if (!model || model->generation == 0) return;
   try {
     instance_->catch_up();            // its names may not have come yet
   } catch (const wire::CallError&) {  // it has gone, or is busy
-    ask_again_ = shm::monotonic_now() + kAskAgainLater;
+    models_.put_off();
     return;
   }
-  memory_ = memory;
-  generation_ = generation;
-  if (is_mentioned(*memory)) return;
-  std::cerr << "arbiter: warning: model " << generation
+  models_.note(*model);
+  if (is_mentioned(*model->memory)) return;
+  std::cerr << "arbiter: warning: model " << model->generation
             << ", which is in force now, does not mention " << port_ << '\n';
 }
 

@@ -1,7 +1,6 @@
 // What arbiter echo says of the daemon and of its models while it watches a port.
 #pragma once
 
-#include <cstdint>
 #include <memory>
 #include <string>
 #include <utility>
@@ -29,10 +28,7 @@ class EchoNews {
   const std::shared_ptr<watch::Instance> instance_;
   const std::string port_;
   DaemonNews daemon_{"watching"};
-  // The model that has been looked at is this memory's.
-  std::shared_ptr<const shm::DecisionMemory> memory_;
-  std::uint64_t generation_ = 0;
-  shm::Nanoseconds ask_again_ = 0;
+  ModelNews models_;
 };
 
 // Null: the policy does not let us observe, or there is no daemon.

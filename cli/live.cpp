@@ -12,6 +12,7 @@
 #include <CLI/CLI.hpp>
 
 #include "recorder/sleep.hpp"
+#include "shm/clock.hpp"
 #include "wire/document.hpp"
 #include "wire/rendezvous.hpp"
 
@@ -90,6 +91,22 @@ void DaemonNews::tell(const watch::Instance& instance) {
   } else {
     std::cerr << "arbiter: a daemon is there again\n";
   }
+}
+
+ModelNews::Model ModelNews::in_force(const watch::Instance& instance) {
+  return {instance.memory(), instance.memory()->tables().generation()};
+}
+
+std::optional<ModelNews::Model> ModelNews::unknown(const watch::Instance& instance) const {
+  Model model = in_force(instance);
+  if (model == noted_ || !instance.has_daemon()) return std::nullopt;
+  if (shm::monotonic_now() < ask_again_) return std::nullopt;
+  return model;
+}
+
+void ModelNews::put_off() {
+  constexpr shm::Nanoseconds kAskAgainLater = 5'000'000'000;
+  ask_again_ = shm::monotonic_now() + kAskAgainLater;
 }
 
 std::string fetch_status_text(const std::string& verb, const std::string& instance) {

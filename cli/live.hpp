@@ -2,13 +2,16 @@
 #pragma once
 
 #include <chrono>
+#include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 
 #include <arbiter/arbiter.hpp>
 
 #include "shm/activity.hpp"
+#include "shm/decision_memory.hpp"
 #include "shm/file_descriptor.hpp"
 #include "watch/instance.hpp"
 #include "wire/call.hpp"
@@ -57,8 +60,26 @@ class DaemonNews {
 // activity ends: publishers do not ring for those who merely observe.
 inline constexpr shm::Nanoseconds kLookEvery = 2'000'000;
 
-// When such a verb asks a daemon again that has not answered: nothing else is done meanwhile.
-inline constexpr shm::Nanoseconds kAskAgainLater = 5'000'000'000;
+// For verbs that ask the daemon once for each model that comes into force.
+class ModelNews {
+ public:
+  struct Model {
+    std::shared_ptr<const shm::DecisionMemory> memory;
+    std::uint64_t generation = 0;
+    friend bool operator==(const Model&, const Model&) = default;
+  };
+  // The one in force; nothing: it is the one that was noted, no daemon is there, or none has
+  // answered lately.
+  [[nodiscard]] std::optional<Model> unknown(const watch::Instance& instance) const;
+  [[nodiscard]] static Model in_force(const watch::Instance& instance);
+  void note(Model model) { noted_ = std::move(model); }
+  // The daemon has not answered, and nothing else was done meanwhile: it is asked again later.
+  void put_off();
+
+ private:
+  Model noted_;
+  shm::Nanoseconds ask_again_ = 0;
+};
 
 // The daemon's status document, as text. Throws wire::CallError, wire::DocumentError.
 std::string fetch_status_text(const std::string& verb, const std::string& instance);

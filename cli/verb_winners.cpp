@@ -170,18 +170,14 @@ class Announcer {
 
   // Once for each model that comes into force: it may arbitrate other ports than the one before.
   void warn_of_patterns_without_winners() {
-    if (options_.patterns == WinnersOptions().patterns || !instance_->has_daemon()) return;
-    const auto memory = instance_->memory();
-    const std::uint64_t generation = memory->tables().snapshot().generation;
-    if (warned_of_ == memory && warned_of_generation_ == generation) return;
-    if (shm::monotonic_now() < ask_again_) return;
+    if (options_.patterns == WinnersOptions().patterns) return;
+    const auto model = models_.unknown(*instance_);
+    if (!model) return;
     try {
       PatternCheck("--port", instance_->status()).arbitrated_inputs(options_.patterns);
-      warned_of_ = memory;
-      warned_of_generation_ = generation;
-    } catch (const wire::CallError&) {
-      // It has gone since, or is busy, which has held up the announcer.
-      ask_again_ = shm::monotonic_now() + kAskAgainLater;
+      models_.note(*model);
+    } catch (const wire::CallError&) {  // it has gone since, or is busy
+      models_.put_off();
     }
   }
 
@@ -205,10 +201,7 @@ class Announcer {
   std::vector<std::string> problems_;  // why, of the last look
   shm::Nanoseconds open_again_ = shm::monotonic_now() + kOpenEvery;
   bool has_started_ = false;
-  // The model of the last warning is this memory's.
-  std::shared_ptr<const shm::DecisionMemory> warned_of_;
-  std::uint64_t warned_of_generation_ = 0;
-  shm::Nanoseconds ask_again_ = 0;
+  ModelNews models_;  // that it has been warned of
   DaemonNews news_{"announcing"};
 };
 
