@@ -262,19 +262,25 @@ TEST_F(RecordingVerb, ExportsOverNoFileUnlessItIsToldTo) {
   }
 }
 
-// Ports as a recorder notes them, and some that it would not.
-std::string with_imports(const TemporaryDirectory& directory) {
-  std::string path = directory.file("imports.mcap");
+// A recording of these alone.
+std::string with_records(std::string path, const std::string& topic,
+                         const std::vector<std::string>& records) {
   recording::McapWriter writer(path, "arbiter test", {});
-  const auto ports = writer.add_channel({0, "arbiter/port", "json", {}});
-  for (const std::string text :
-       {R"({"port": "/b:o", "host": "rear"})", R"({"port": "/b:o", "host": "head"})",
-        R"({"port": "/b:o", "host": "head"})", R"({"port": "/a:o", "host": "he\u001bad"})",
-        R"({"port": "/here:o"})", R"({"port": 5, "host": 6})", "[", "7"}) {
-    writer.write({ports, 0, kNoon, kNoon, std::as_bytes(std::span(text))});
+  const auto channel = writer.add_channel({0, topic, "json", {}});
+  for (const std::string& text : records) {
+    writer.write({channel, 0, kNoon, kNoon, std::as_bytes(std::span(text))});
   }
   writer.close();
   return path;
+}
+
+// Ports as a recorder notes them, and some that it would not.
+std::string with_imports(const TemporaryDirectory& directory) {
+  return with_records(
+      directory.file("imports.mcap"), "arbiter/port",
+      {R"({"port": "/b:o", "host": "rear"})", R"({"port": "/b:o", "host": "head"})",
+       R"({"port": "/b:o", "host": "head"})", R"({"port": "/a:o", "host": "he\u001bad"})",
+       R"({"port": "/here:o"})", R"({"port": 5, "host": 6})", "[", "7"});
 }
 
 TEST_F(RecordingVerb, SaysFromWhichHostsSourcesCame) {
@@ -287,17 +293,11 @@ TEST_F(RecordingVerb, SaysFromWhichHostsSourcesCame) {
 
 // As a recorder notes them, and some that it would not.
 std::string with_unrecorded(const TemporaryDirectory& directory) {
-  std::string path = directory.file("unrecorded.mcap");
-  recording::McapWriter writer(path, "arbiter test", {});
-  const auto missed = writer.add_channel({0, "arbiter/missed", "json", {}});
-  for (const std::string text :
-       {R"({"source": "/b:o", "why": "refused", "text": "no\u001b"})",
-        R"({"source": "/a:o", "why": "stranger", "text": "of component nav, pid 7"})",
-        R"({"source": "/c:o", "why": "queue", "text": ""})", R"({"source": 5, "why": 6})", "["}) {
-    writer.write({missed, 0, kNoon, kNoon, std::as_bytes(std::span(text))});
-  }
-  writer.close();
-  return path;
+  return with_records(
+      directory.file("unrecorded.mcap"), "arbiter/missed",
+      {R"({"source": "/b:o", "why": "refused", "text": "no\u001b"})",
+       R"({"source": "/a:o", "why": "stranger", "text": "of component nav, pid 7"})",
+       R"({"source": "/c:o", "why": "queue", "text": ""})", R"({"source": 5, "why": 6})", "["});
 }
 
 TEST_F(RecordingVerb, SaysWhichSourcesWereNotRecorded) {

@@ -1,5 +1,5 @@
 // A daemon takes over when a component has no port left, or has ended while there was no daemon.
-#include <gtest/gtest.h>
+#include <gmock/gmock.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -15,9 +15,14 @@
 #include "tests/client/samples.hpp"
 #include "tests/support/await.hpp"
 #include "tests/support/daemon.hpp"
+#include "tests/support/error_of.hpp"
+#include "wire/call.hpp"
 
 namespace arbiter::test {
 namespace {
+
+using testing::HasSubstr;
+using testing::Not;
 
 void expect_what_was_active(Daemon& daemon, Node& node) {
   daemon.kill();
@@ -162,20 +167,46 @@ TEST(Takeover, OfMoreNodesThanAnyoneCountsAllPortsAreFreed) {
   await([&] { return !keeps_any(daemon); });
 }
 
-// What the socket had no room for is not told as a death.
-TEST(EndedNode, HasLeftInGoodOrderThoughItsPortsWereOpen) {
-  Daemon daemon(single_model());
-  {
-    Node ended("ended", without_thread());
-    daemon.process().stop();
-    EXPECT_THROW(static_cast<void>(ended.output_port<Number>("/out")), Error);
-    daemon.process().resume();
-    await([&] { return daemon.source("/out")["open"] == true; });
-  }
-  await([&] { return daemon.source("/out")["open"] == false; });
+void expect_left(Daemon& daemon) {
   const std::string left = "node \"ended\" (pid " + std::to_string(getpid()) + ") left\n";
   await([&] { return daemon.log().find(left) != std::string::npos; });
   EXPECT_TRUE(daemon.status()["deaths"].empty());
+}
+
+// A node does, and ends; the daemon has opened /out for it all the same.
+void give_up_an_opening(Daemon& daemon) {
+  Node ended("ended", without_thread());
+  daemon.process().stop();
+  EXPECT_THROW(static_cast<void>(ended.output_port<Number>("/out")), Error);
+  daemon.process().resume();
+  await([&] { return daemon.source("/out")["open"] == true; });
+}
+
+// What the socket had no room for is not told as a death.
+TEST(EndedNode, HasLeftInGoodOrderThoughItsPortsWereOpen) {
+  Daemon daemon(single_model());
+  give_up_an_opening(daemon);
+  await([&] { return daemon.source("/out")["open"] == false; });
+  expect_left(daemon);
+}
+
+// Its own word may be read after that of another node of its process.
+TEST(EndedNode, HasLeftInGoodOrderThoughAnotherNodeIsHeardFirst) {
+  Daemon daemon(single_model());
+  Node ended("ended", without_thread());
+  auto out = ended.output_port<Number>("/out");
+  wire::Caller caller;
+  caller.name = "other";
+  caller.instance = "test";
+  const wire::Welcome other = wire::join(caller);
+  wire::Message message;
+  message.kind = wire::MessageKind::kNodeEnded;
+  message.link = other.received.message.link - 1;
+  ASSERT_EQ(wire::send_message(other.socket.get(), message), wire::SendResult::kSent);
+  expect_left(daemon);
+  EXPECT_THAT(daemon.log(), Not(HasSubstr("is away")));
+  Component next("next");
+  EXPECT_EQ(next.tell("output /out"), "open");
 }
 
 // Nobody else of its process says anything meanwhile.
@@ -196,16 +227,9 @@ TEST(EndedNode, IsToldByAnIdleNodeOfItsProcess) {
   }
 }
 
-// It has given the opening up; the daemon has opened the port for it all the same.
 TEST(EndedNode, LeavesNothingOfAnOpeningThatItDidNotWaitFor) {
   Daemon daemon(single_model());
-  {
-    Node ended("ended", without_thread());
-    daemon.process().stop();
-    EXPECT_THROW(static_cast<void>(ended.output_port<Number>("/out")), Error);
-    daemon.process().resume();
-    await([&] { return daemon.source("/out")["open"] == true; });
-  }
+  give_up_an_opening(daemon);
   Component other("other");
   EXPECT_EQ(other.tell("output /out"), "open");
 }
@@ -225,6 +249,25 @@ TEST(Opening, AgainAfterADaemonDidNotAnswerIsNotRefusedForTheFirst) {
   is_second = true;
   auto out = node.output_port<Number>("/out");
   EXPECT_EQ(out.publish(Number{1}).delivered, 0u);
+}
+
+// It is asked for once more, since the first one may have been in the way; another's port stays so.
+TEST(Opening, BehindOneThatWasGivenUpIsRefusedForAnother) {
+  Daemon daemon(single_model());
+  Component holder("holder");
+  ASSERT_EQ(holder.tell("output /out"), "open");
+  bool is_second = false;
+  NodeOptions options;
+  options.connect_timeout = std::chrono::milliseconds(0);
+  options.on_waiting = [&](const std::string&) {
+    if (is_second) daemon.process().resume();
+  };
+  Node node("test", options);
+  daemon.process().stop();
+  EXPECT_THROW(static_cast<void>(node.output_port<Number>("/out")), Error);
+  is_second = true;
+  EXPECT_THAT(error_of([&] { auto out = node.output_port<Number>("/out"); }),
+              HasSubstr("is held by node \"holder\""));
 }
 
 }  // namespace
