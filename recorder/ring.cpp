@@ -195,8 +195,8 @@ void Ring::sum_up(const Record& record) {
     kept.by.clear();
     if (winner->winner.empty()) winners_.erase(winner->port);
   } else if (const auto* missed = std::get_if<Missed>(&record)) {
-    using Why = Missed::Why;
-    const bool is_untapped = missed->why == Why::refused || missed->why == Why::stranger;
+    const bool is_untapped =
+        missed->why == Missed::Why::refused || missed->why == Missed::Why::stranger;
     if (is_untapped) untapped_[{missed->source, missed->why}] = *missed;
   }
 }
