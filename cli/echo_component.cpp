@@ -98,7 +98,7 @@ class Echo {
   const EchoOptions& options_;
   const shm::FileDescriptor& interrupts_;
   EchoHosts hosts_{options_.instance};
-  EchoNews news_{observe_for_echo(options_.instance), options_.port};
+  EchoNews news_{options_.instance, options_.port};
   Node node_;
   InputPort<void> in_;
   const shm::Nanoseconds started_;

@@ -1,14 +1,19 @@
 #include "cli/echo_news.hpp"
 
-#include <exception>
+#include <chrono>
 #include <iostream>
 #include <optional>
 
+#include "wire/call.hpp"
+
 namespace arbiter::cli {
 
-EchoNews::EchoNews(std::shared_ptr<watch::Instance> instance, std::string port)
-    : instance_(std::move(instance)), port_(std::move(port)) {
-  if (instance_ != nullptr) models_.note(ModelNews::in_force(*instance_));
+EchoNews::EchoNews(const std::string& instance, std::string port) : port_(std::move(port)) {
+  try {
+    instance_ = watch_instance("echo", instance);
+    models_.note(ModelNews::in_force(*instance_));
+  } catch (const wire::RefusedError&) {  // by the policy
+  }
 }
 
 void EchoNews::tell() {
@@ -22,8 +27,8 @@ void EchoNews::tell_of_model() {
   const auto model = models_.unknown(*instance_);
   if (!model || model->generation == 0) return;
   try {
-    instance_->catch_up();            // its names may not have come yet
-  } catch (const wire::CallError&) {  // it has gone, or is busy
+    instance_->catch_up(std::chrono::seconds(1));  // its names may not have come yet
+  } catch (const wire::CallError&) {               // it has gone, or is busy
     models_.put_off();
     return;
   }
@@ -38,14 +43,6 @@ bool EchoNews::is_mentioned(const shm::DecisionMemory& memory) const {
   const auto source = instance_->find_source(port_);
   const auto port = instance_->find_port(port_);
   return (source && table.knows_source(*source)) || (port && table.knows_port(*port));
-}
-
-std::shared_ptr<watch::Instance> observe_for_echo(const std::string& instance) {
-  try {
-    return follow_instance("echo", instance);
-  } catch (const std::exception&) {
-    return nullptr;
-  }
 }
 
 }  // namespace arbiter::cli

@@ -15,23 +15,22 @@ namespace arbiter::cli {
 // into force that does not mention the port. Silent where the policy does not let us observe.
 class EchoNews {
  public:
-  // `instance`: null where it cannot be observed.
-  EchoNews(std::shared_ptr<watch::Instance> instance, std::string port);
+  // Throws wire::CallError where no daemon answers.
+  EchoNews(const std::string& instance, std::string port);
   // To be called several times a second. Asks the daemon for its names once for each model, for a
   // second at most.
   void tell();
+  // Null: the policy does not let us observe.
+  [[nodiscard]] watch::Instance* instance() noexcept { return instance_.get(); }
 
  private:
   void tell_of_model();
   [[nodiscard]] bool is_mentioned(const shm::DecisionMemory& memory) const;
 
-  const std::shared_ptr<watch::Instance> instance_;
+  std::shared_ptr<watch::Instance> instance_;
   const std::string port_;
   DaemonNews daemon_{"watching"};
   ModelNews models_;
 };
-
-// Null: the policy does not let us observe, or there is no daemon.
-[[nodiscard]] std::shared_ptr<watch::Instance> observe_for_echo(const std::string& instance);
 
 }  // namespace arbiter::cli

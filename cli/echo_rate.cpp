@@ -183,9 +183,8 @@ class RateEcho {
 }  // namespace
 
 int echo_rate(const EchoOptions& options, const shm::FileDescriptor& interrupts) {
-  const auto instance = observe_for_echo(options.instance);
-  EchoNews news(instance, options.port);
-  return RateEcho(options, kind_of_port(options, instance.get()), news, interrupts).run();
+  EchoNews news(options.instance, options.port);
+  return RateEcho(options, kind_of_port(options, news.instance()), news, interrupts).run();
 }
 
 }  // namespace arbiter::cli

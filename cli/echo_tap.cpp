@@ -262,9 +262,8 @@ TapOf kind_of_port(const EchoOptions& options, watch::Instance* instance) {
 }
 
 int echo_tap(const EchoOptions& options, const shm::FileDescriptor& interrupts) {
-  const auto instance = observe_for_echo(options.instance);
-  EchoNews news(instance, options.port);
-  return TapEcho(options, kind_of_port(options, instance.get()), news, interrupts).run();
+  EchoNews news(options.instance, options.port);
+  return TapEcho(options, kind_of_port(options, news.instance()), news, interrupts).run();
 }
 
 }  // namespace arbiter::cli

@@ -269,6 +269,21 @@ TEST(Echo, SaysWhatBecomesOfTheDaemonAndOfThePortInAnotherModel) {
   }
 }
 
+TEST(Echo, SaysSoOfADaemonThatDidNotAnswerAtFirst) {
+  Daemon daemon(kOverrideModel);
+  const std::string path = daemon.directory() + "/err";
+  const shm::FileDescriptor err(::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600));
+  daemon.process().stop();
+  const ChildProcess program({ARBITER_PROGRAMS "/arbiter", "echo", "/p"}, {}, {-1, -1, err.get()});
+  const auto said = [&](const char* text) {
+    return content_of(path).find(text) != std::string::npos;
+  };
+  await([&] { return said("waiting"); });  // by what it taps with, after it has asked in vain
+  daemon.process().resume();
+  daemon.load("<behaviors><arbiter at='/q'><select from='/low'/></arbiter></behaviors>");
+  await([&] { return said("which is in force now, does not mention /p\n"); });
+}
+
 TEST(Echo, AsAComponentTakesThePort) {
   Daemon daemon(kOverrideModel);
   Node node("test");
