@@ -83,6 +83,7 @@ class Flight {
     options.file = file;
     options.info = info;
     options.keep = options_.keep;
+    options.after = options_.after;
     options.told = [this](const recorder::Dumped& dumped) {
       const std::lock_guard lock(mutex_);
       dumped_.push_back(dumped);

@@ -194,6 +194,15 @@ void add_flight_options(CLI::App& verb, const std::shared_ptr<RecordOptions>& op
           "reads it")
       ->type_name("STATEMENT")
       ->needs(ring);
+  verb.add_option_function<std::string>(
+          "--after",
+          [options](const std::string& text) {
+            options->flight.after = read_time("--after", text);
+          },
+          "With --ring: how long a file of --when or of a death goes on after its reason (default "
+          "2s), so that it shows what came of it; at most half of --ring's time")
+      ->type_name("DURATION")
+      ->needs(ring);
   verb.add_option("--keep", options->flight.keep,
                   "With --ring: how many files of --when and of deaths are kept (default 16); for "
                   "a newer one, the recorder removes its oldest. Files that you ask for stay")

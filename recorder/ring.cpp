@@ -204,26 +204,35 @@ void Ring::sum_up(const Record& record) {
 void Ring::finish(Nanoseconds horizon) {
   horizon_ = horizon;
   is_ending_ = true;
-  write_due(shm::monotonic_now(), shm::kForever);
-}
-
-bool Ring::is_resting(Cause cause, Nanoseconds now) const {
-  const auto last = written_at_.find(cause);
-  return last != written_at_.end() && !is_ending_ &&
-         now - last->second < std::min(kMostRest, options_.span / 2);
+  write_due(shm::monotonic_now());
 }
 
 void Ring::tick(Nanoseconds now, Nanoseconds horizon) {
   horizon_ = horizon;
-  write_due(now, horizon);
+  write_due(now);
 }
 
-void Ring::write_due(Nanoseconds now, Nanoseconds asked_by) {
+bool Ring::is_due(const Request& request, Nanoseconds now) const {
+  if (is_ending_) return true;
+  if (request.time > horizon_) return false;
+  if (!is_of_own_accord(request.cause)) return true;
+  if (is_resting(request.cause, now)) return false;
+  const Nanoseconds after = std::min(options_.after, options_.span / 2);
+  const bool is_losing_what_led_to_it = forgotten_ != 0 && base_time_ > request.time - after;
+  return horizon_ - request.time >= after || is_losing_what_led_to_it;
+}
+
+bool Ring::is_resting(Cause cause, Nanoseconds now) const {
+  const auto last = written_at_.find(cause);
+  return last != written_at_.end() && now - last->second < std::min(kMostRest, options_.span / 2);
+}
+
+void Ring::write_due(Nanoseconds now) {
   std::map<Cause, std::vector<std::uint64_t>> due;
   {
     const std::lock_guard lock(mutex_);
     std::erase_if(requests_, [&](const Request& request) {
-      if (request.time > asked_by || is_resting(request.cause, now)) return false;
+      if (!is_due(request, now)) return false;
       due[request.cause].push_back(request.number);
       return true;
     });

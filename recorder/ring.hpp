@@ -2,7 +2,8 @@
 //
 // Its memory is bounded by time and by bytes, whichever comes first; what it writes of its own
 // accord, by the number of files, and by a rest after each (kMostRest), at the end of which one
-// file has all that has come meanwhile. What leaves it has been summed up: the state
+// file has all that has come meanwhile. Such a file is not written at once, for what comes of a
+// death is of interest as well (RingOptions::after). What leaves it has been summed up: the state
 // of each source, the model, the open ports and the winners at the moment where the rest begins. So
 // each file is whole: it begins as any recording does. Large samples do not drive out who
 // commanded: beyond half of the memory, payloads give way before records do.
@@ -50,6 +51,9 @@ struct RingOptions {
   std::function<std::int64_t()> wall_offset = evidence::wall_offset_now;
   // Dump where a component has died.
   bool on_death = true;
+  // How long a file of its own accord goes on after its reason: never longer than half of the span,
+  // nor than what came before it, where the memory keeps less than the span.
+  Nanoseconds after = 0;
   // On the pipeline's thread.
   std::function<void(const Dumped&)> told;
 };
@@ -60,8 +64,8 @@ class Ring : public Sink {
       : options_(std::move(options)), own_files_(options_.prefix, options_.keep) {}
 
   // Any thread: write a file as soon as all that has happened by now is here, some twentieths of a
-  // second at most. Returns the number of the request, which may be that of others for the same
-  // cause that wait.
+  // second at most; of its own accord, later. Returns the number of the request, which may be that
+  // of others for the same cause that wait.
   std::uint64_t request(Cause cause);
 
   void write(const RecordPtr& record) override;
@@ -72,12 +76,18 @@ class Ring : public Sink {
   [[nodiscard]] std::uint64_t dumps() const { return dumps_; }
 
  private:
-  void write_due(Nanoseconds now, Nanoseconds asked_by);
+  void write_due(Nanoseconds now);
   void add(const RecordPtr& record);
   void make_room();
   void forget_oldest();
   void drop_oldest_payload();
   void sum_up(const Record& record);
+  struct Request {
+    std::uint64_t number = 0;
+    Cause cause = Cause::asked;
+    Nanoseconds time = 0;
+  };
+  [[nodiscard]] bool is_due(const Request& request, Nanoseconds now) const;
   [[nodiscard]] bool is_resting(Cause cause, Nanoseconds now) const;
   void dump(Cause cause, std::vector<std::uint64_t> requests);
   [[nodiscard]] std::string write_file(Cause cause) const;
@@ -112,11 +122,6 @@ class Ring : public Sink {
   std::map<std::string, evidence::WinnerChange> winners_;
 
   std::mutex mutex_;
-  struct Request {
-    std::uint64_t number = 0;
-    Cause cause = Cause::asked;
-    Nanoseconds time = 0;
-  };
   std::vector<Request> requests_;  // under it, by number
   std::uint64_t requested_ = 0;    // under it
 };

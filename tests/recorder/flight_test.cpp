@@ -2,16 +2,19 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <filesystem>
 
 #include <arbiter/arbiter.hpp>
 
+#include "evidence/record_reader.hpp"
 #include "tests/client/component.hpp"
 #include "tests/recorder/recording.hpp"
 
 namespace arbiter::test {
 namespace {
 
+using testing::Each;
 using testing::HasSubstr;
 using testing::SizeIs;
 
@@ -41,6 +44,19 @@ class Flight : public testing::Test {
       };
       if (files.size() >= count && std::all_of(files.begin(), files.end(), is_whole)) return files;
     }
+  }
+  // A file that is asked for now.
+  std::string dumped() {
+    const std::string said = arbiter({"record", "--dump", "-o", prefix_}).out;
+    return said.substr(said.find('/'), said.size() - said.find('/') - 1);
+  }
+  static bool has_died(const std::string& file) {
+    bool has_died = false;
+    evidence::read_recording(file, evidence::Payloads::pass_over, [&](evidence::Record&& record) {
+      const auto* port = std::get_if<evidence::PortChange>(&record);
+      if (port != nullptr) has_died |= port->what == evidence::PortChange::What::died;
+    });
+    return has_died;
   }
   void expect_reproduced(const std::string& file, const std::string& decisions) {
     const auto result = arbiter({"simulate", "--recording", file});
@@ -100,7 +116,7 @@ TEST_F(Flight, WritesWhereAStatementBecomesTrue) {
   auto low = node.output_port<int>("/low");
   auto high = node.output_port<int>("/high");
   auto in = node.input_port<int>("/p");
-  ChildProcess recorder = fly({"--when", "winner(/p) = /high and /low"});
+  ChildProcess recorder = fly({"--when", "winner(/p) = /high and /low", "--after", "0s"});
   low.publish(1);
   high.publish(2);
   EXPECT_THAT(wait_for_files(1).at(0), HasSubstr("-when.mcap"));
@@ -111,7 +127,7 @@ TEST_F(Flight, WritesWhereAStatementBecomesTrue) {
 TEST_F(Flight, WritesWhereAComponentDies) {
   Node node("test");
   auto in = node.input_port("/p");
-  ChildProcess recorder = fly();
+  ChildProcess recorder = fly({"--after", "10ms"});
   {
     auto closed = node.output_port<int>("/high");  // in good order: no reason to write
     closed.signal();
@@ -125,6 +141,28 @@ TEST_F(Flight, WritesWhereAComponentDies) {
   EXPECT_THAT(files.at(0), HasSubstr("-death.mcap"));
   recorder.signal(SIGINT);
   EXPECT_EQ(recorder.wait(), 0);
+}
+
+TEST_F(Flight, ShowsWhatCameOfADeath) {
+  Node node("test");
+  auto in = node.input_port("/p");
+  auto high = node.output_port<int>("/high");
+  ChildProcess recorder = fly({"--after", "60s"});
+  Component component("arm");
+  component.tell("output /low");
+  component.tell("publish /low 1");
+  component.kill();
+  await([&] { return has_died(dumped()); });
+  EXPECT_THAT(files_in(daemon_.directory()), Each(HasSubstr("-asked")));
+  high.publish(2);
+  recorder.signal(SIGINT);
+  EXPECT_EQ(recorder.wait(), 0);
+  const auto files = files_in(daemon_.directory());
+  const auto death = std::find_if(files.begin(), files.end(), [](const std::string& file) {
+    return file.find("-death.mcap") != std::string::npos;
+  });
+  ASSERT_NE(death, files.end());
+  EXPECT_THAT(arbiter({"recording", "winners", *death}).out, HasSubstr("/high"));
 }
 
 // A name may be misspelt; or the model that has it is yet to come.

@@ -76,6 +76,57 @@ TEST_F(RingTest, HoldsABoundedNumberOfRequests) {
   EXPECT_EQ(told_[0].requests.size(), numbers.size());
 }
 
+TEST_F(RingTest, AFileOfItsOwnAccordShowsWhatCameOfItsReason) {
+  auto settings = options(60 * kSecond, 1 << 20);
+  settings.after = 2 * kSecond;
+  recorder::Ring ring(settings);
+  feed(ring, Incident());
+  const evidence::Nanoseconds before = shm::monotonic_now();
+  ring.request(recorder::Cause::death);
+  ring.request(recorder::Cause::asked);
+  const evidence::Nanoseconds requested = shm::monotonic_now();
+  ring.tick(requested, before + 2 * kSecond - 1);
+  ASSERT_THAT(told_, SizeIs(1));
+  EXPECT_THAT(told_[0].file, HasSubstr("-asked.mcap")) << "whoever asks does not wait";
+  ring.tick(requested, requested + 2 * kSecond);
+  ASSERT_THAT(told_, SizeIs(2));
+  EXPECT_THAT(told_[1].file, HasSubstr("-death.mcap"));
+  EXPECT_EQ(evidence::load_recording(told_[1].file).runs.at(0).end, requested + 2 * kSecond);
+  ring.request(recorder::Cause::when);
+  ring.finish(requested + 2 * kSecond);
+  EXPECT_THAT(told_, SizeIs(3)) << "at the end nothing waits";
+}
+
+TEST_F(RingTest, WaitsForNoLongerThanHalfOfWhatItKeeps) {
+  auto settings = options(2 * kSecond, 1 << 20);
+  settings.after = 60 * kSecond;
+  recorder::Ring ring(settings);
+  ring.request(recorder::Cause::death);
+  const evidence::Nanoseconds requested = shm::monotonic_now();
+  ring.tick(requested, requested + kSecond);
+  EXPECT_THAT(told_, SizeIs(1));
+}
+
+// Where samples come so fast that the memory keeps less than that.
+TEST_F(RingTest, WritesBeforeWhatLedToItHasGivenWay) {
+  auto settings = options(60 * kSecond, 64 << 10);
+  settings.after = 10 * kSecond;
+  recorder::Ring ring(settings);
+  ring.request(recorder::Cause::death);
+  const evidence::Nanoseconds now = shm::monotonic_now();
+  const evidence::Nanoseconds ago = now - 5 * kSecond;
+  Incident incident;
+  for (int i = 0; i < 10; ++i) incident.arrive("/high", ago + i, now, Incident::Fate::accepted);
+  feed(ring, incident);
+  ring.tick(now, now);
+  EXPECT_THAT(told_, SizeIs(0)) << "nothing has given way";
+  Incident more;
+  for (int i = 0; i < 1000; ++i) more.arrive("/high", ago + i, now, Incident::Fate::accepted);
+  feed(ring, more);
+  ring.tick(now, now);
+  EXPECT_THAT(told_, SizeIs(1));
+}
+
 // A statement that flips all the time.
 TEST_F(RingTest, RestsAfterAFileThatNobodyHasAskedFor) {
   recorder::Ring ring(options(60 * kSecond, 1 << 20));
