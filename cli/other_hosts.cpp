@@ -9,6 +9,8 @@
 #include <nlohmann/json.hpp>
 
 #include "shm/utf8.hpp"
+#include "watch/imported.hpp"
+#include "watch/past.hpp"
 #include "watch/span.hpp"
 #include "wire/document.hpp"
 #include "wire/link_call.hpp"
@@ -114,25 +116,40 @@ Ages ages_in(const watch::Instance& instance) {
   }
 }
 
+bool is_left(const wire::Status& here, const std::string& source) {
+  const wire::SourceStatus* const found = here.find_source(source);
+  const bool is_there = found != nullptr && (found->open || found->away_pid);
+  return !is_there && watch::death_of(here, watch::kOutputEnd, source) == nullptr;
+}
+
 void write_imports(std::ostream& out, const std::vector<std::string>& sources,
-                   const wire::HostsDocument& hosts, const Ages& ages) {
+                   const wire::Status& here, const wire::HostsDocument& hosts, const Ages& ages) {
   bool is_first = true;
-  for (const std::string& source : sources) {
-    const wire::ImportStatus* const import = hosts.find_import(source);
-    if (import == nullptr || !(import->is_open || import->is_gone())) continue;
+  const auto begin_line = [&](const std::string& source) {
     out << (std::exchange(is_first, false) ? "\nFrom other hosts:\n" : "") << "  "
         << shm::printable(source);
-    if (import->is_gone()) {
-      out << "  came from host " << shm::printable(import->host)
-          << ", which does not offer it now, or is not heard (arbiter hosts)\n";
-      continue;
+  };
+  for (const std::string& source : sources) {
+    const wire::ImportStatus* const import = hosts.find_import(source);
+    if (import == nullptr || import->is_open_here) continue;
+    const wire::SourceStatus* const found = here.find_source(source);
+    std::string from = found == nullptr ? "" : watch::host_of(*found);
+    const bool is_open = !from.empty();
+    if (from.empty() || from == watch::kUnknownHost) from = import->host;
+    const wire::HostStatus* const host = hosts.find_host(from);
+    if (is_open) {
+      begin_line(source);
+      out << "  from host " << shm::printable(from) << ", round trip "
+          << round_trip_text(host == nullptr ? std::nullopt : host->round_trip);
+      const auto age = ages.find(source);
+      if (age != ages.end()) out << ", " << age->second;
+      out << counts_text(*import) << '\n';
+    } else if (import->is_gone() && is_left(here, source)) {
+      begin_line(source);
+      out << "  came from host " << shm::printable(from)
+          << (host != nullptr && host->is_up ? ", which does not offer it now\n"
+                                             : ", which is gone (arbiter hosts)\n");
     }
-    const wire::HostStatus* const host = hosts.find_host(import->host);
-    out << "  from host " << shm::printable(import->host) << ", round trip "
-        << round_trip_text(host == nullptr ? std::nullopt : host->round_trip);
-    const auto age = ages.find(source);
-    if (age != ages.end()) out << ", " << age->second;
-    out << counts_text(*import) << '\n';
   }
 }
 

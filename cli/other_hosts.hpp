@@ -54,10 +54,14 @@ using Ages = std::map<std::string, std::string>;
 // As they are now.
 [[nodiscard]] Ages ages_in(const watch::Instance& instance);
 
+// Whether nobody has the source open, and none of those who died here had it last.
+[[nodiscard]] bool is_left(const wire::Status& here, const std::string& source);
+
 // Those of the sources that the link of this host has open, a line for each: from which host, how
-// far away that is, how old the last event is, and what was lost.
+// far away that is, how old the last event is, and what was lost. Also those that came from a host
+// and that nobody has open. What is open the daemon's status says, which `hosts` may lag behind.
 void write_imports(std::ostream& out, const std::vector<std::string>& sources,
-                   const wire::HostsDocument& hosts, const Ages& ages);
+                   const wire::Status& here, const wire::HostsDocument& hosts, const Ages& ages);
 
 // "default 08056122", "no daemon", …; "differs" where it is not that of `here` (may be null).
 [[nodiscard]] std::string model_text(const wire::HostStatus& host, const wire::HostStatus* here);

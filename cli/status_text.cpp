@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <initializer_list>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -9,6 +10,7 @@
 #include "rules/text/names.hpp"
 #include "shm/clock.hpp"
 #include "shm/utf8.hpp"
+#include "watch/past.hpp"
 #include "watch/process.hpp"
 
 namespace arbiter::cli {
@@ -66,6 +68,11 @@ void print_model(std::ostream& out, const wire::Status& status) {
   for (const auto& file : model.files) out << ' ' << file;
   if (model.application) out << ", application " << *model.application;
   out << '\n';
+  if (model.refused) {
+    out << "  the files of --model were refused, so it keeps the model of the last daemon; mend "
+           "them, then run arbiter reload: "
+        << shm::printable(model.refused->why) << '\n';
+  }
   if (model.reloads_refused != 0) {
     out << "  " << rules::counted(model.reloads_refused, "reload")
         << " refused since this daemon started; its log says why\n";
@@ -106,6 +113,16 @@ void print_refusals(std::ostream& out, StatusPlace place, const wire::Status& st
     }
     out << ": " << shm::printable(each.why) << '\n';
   }
+}
+
+// Who had the port open last, and died.
+void print_death(std::ostream& out, StatusPlace place, const wire::Status& status,
+                 const watch::PortEnd& end, const auto& port) {
+  const wire::DeathStatus* const death = watch::death_of(status, end, port.name);
+  if (port.open || port.away_pid || death == nullptr) return;
+  const auto here =
+      place == StatusPlace::kHere ? std::optional(shm::monotonic_now()) : std::nullopt;
+  out << "           " << watch::death_text(*death, here ? here : status.now) << '\n';
 }
 
 void print_source(std::ostream& out, StatusPlace place, const wire::SourceStatus& source,
@@ -194,6 +211,7 @@ void write_status(std::ostream& out, const wire::Status& status, StatusPlace pla
   out << "\nsources\n";
   for (const auto& source : status.sources) {
     print_source(out, place, source, has_model);
+    print_death(out, place, status, watch::kOutputEnd, source);
     print_refusals(out, place, status, &wire::RefusalStatus::output, source);
   }
   out << "\ninput ports  (* winner, x selected but cannot deliver, - active and overridden, "
@@ -201,6 +219,7 @@ void write_status(std::ostream& out, const wire::Status& status, StatusPlace pla
          "sensed)\n";
   for (const auto& input : status.inputs) {
     print_input(out, place, input, has_model);
+    print_death(out, place, status, watch::kInputEnd, input);
     print_refusals(out, place, status, &wire::RefusalStatus::input, input);
   }
 }

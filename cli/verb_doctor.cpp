@@ -89,6 +89,7 @@ int examine(const DoctorOptions& options) {
   if (status) {
     add(watch::examine_processes(machine, *status));
     if (options.root.empty()) {
+      add(watch::examine_model(*status));
       add(watch::examine_deaths(*status));
       add(watch::examine_ports(*status));
     }

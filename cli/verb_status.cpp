@@ -50,7 +50,8 @@ const wire::HostStatus* find_host(const wire::HostsDocument& hosts,
 }
 
 // What this host has of others. Without ages, where they cannot be seen.
-void write_imports_here(const std::string& instance, const wire::HostsDocument& hosts) {
+void write_imports_here(const std::string& instance, const wire::Status& here,
+                        const wire::HostsDocument& hosts) {
   std::vector<std::string> sources;
   for (const wire::ImportStatus& each : hosts.imports) {
     if (each.is_open || each.is_gone()) sources.push_back(each.source);
@@ -61,7 +62,7 @@ void write_imports_here(const std::string& instance, const wire::HostsDocument& 
     ages = ages_in(*watch_instance("status", instance));
   } catch (const std::runtime_error&) {  // the daemon has just gone, or has no room for us
   }
-  write_imports(std::cout, sources, hosts, ages);
+  write_imports(std::cout, sources, here, hosts, ages);
 }
 
 // Writes one host's answer; what is wrong with it stands in `why_not`.
@@ -76,7 +77,7 @@ void write_host(const StatusOptions& options, const wire::HostsDocument& hosts,
                 : "round trip " + round_trip_text(host ? host->round_trip : std::nullopt);
     std::cout << "== host " << answer.host << " (" << where << ") ==\n";
     write_status(std::cout, status, is_here ? StatusPlace::kHere : StatusPlace::kElsewhere);
-    if (is_here) write_imports_here(options.instance, hosts);
+    if (is_here) write_imports_here(options.instance, status, hosts);
     std::cout << '\n';
   } catch (const wire::DocumentError& error) {
     why_not = std::string("sent no status that can be read: ") + error.what();

@@ -15,6 +15,7 @@
 #include "cli/live.hpp"
 #include "cli/switch_everywhere.hpp"
 #include "cli/verbs.hpp"
+#include "shm/utf8.hpp"
 #include "wire/document.hpp"
 #include "wire/link_call.hpp"
 
@@ -33,7 +34,8 @@ struct SwitchOptions {
 };
 
 int list(const SwitchOptions& options) {
-  const auto models = fetch_status("switch", options.instance).models;
+  const wire::Status status = fetch_status("switch", options.instance);
+  const auto& models = status.models;
   if (options.json) {
     std::cout << wire::write_document(to_json(models));
     return 0;
@@ -47,7 +49,13 @@ int list(const SwitchOptions& options) {
     }
     std::cout << '\n';
   }
-  if (models.empty()) std::cout << "no model is loaded; start the daemon with --model\n";
+  if (models.empty() && status.model.refused) {
+    std::cout << "no model is loaded, because the files of --model were refused; mend them, then "
+                 "run arbiter reload: "
+              << shm::printable(status.model.refused->why) << '\n';
+  } else if (models.empty()) {
+    std::cout << "no model is loaded; start the daemon with --model\n";
+  }
   return 0;
 }
 

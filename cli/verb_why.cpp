@@ -36,10 +36,7 @@ int why(const WhyOptions& options) {
     return 0;
   }
   const auto instance = watch_instance("why", options.instance);
-  write_why(std::cout, options, instance);
-  if (hosts && !options.json) {
-    write_imports_of(std::cout, options.port, *hosts, *instance);
-  }
+  write_why(std::cout, options, instance, nullptr, hosts ? &*hosts : nullptr);
   return 0;
 }
 
@@ -78,6 +75,7 @@ void add_why(CLI::App& app, int& exit_code) {
       "  arbiter why /Gaze/pos:i --follow\n"
       "  arbiter why /Gaze/pos:i --host head\n"
       "  arbiter why /Gaze/pos:i --host head --follow\n\n"
+      "Of a recording: arbiter simulate --recording FILE --why=PORT --at TIME\n\n"
       "Exit codes: 0 answered, whoever wins; 1 no daemon, no such port or source, you may not\n"
       "observe, or the other host does not answer; 2 wrong use, or the answer cannot be written");
   verb->callback([options, &exit_code] { exit_code = why(*options); });

@@ -8,6 +8,7 @@
 
 #include "cli/model_report.hpp"
 #include "cli/name_warnings.hpp"
+#include "cli/why_imports.hpp"
 #include "cli/why_report.hpp"
 #include "cli/why_summary.hpp"
 #include "rules/text/names.hpp"
@@ -35,13 +36,14 @@ int rank(const ConnectionExplanation& connection) {
 
 WhyAnswer::WhyAnswer(const WhyOptions& options, const watch::Port& port, Look look,
                      rules::PortExplanation explanation, const wire::Status& status,
-                     std::ostream& out)
+                     watch::Fates fates, std::ostream& out)
     : out_(out),
       options_(options),
       port_(port),
       look_(std::move(look)),
       explanation_(std::move(explanation)),
-      obstacles_(status, port.name(), look_.sources, port.known_sources(), port.known_ports()),
+      obstacles_(status, port.name(), look_.sources, port.known_sources(), port.known_ports(),
+                 std::move(fates)),
       tenure_(
           rules::tenure_of(look_.table(), port.id(), look_.winner,
                            {look_.sources.now(), port.model().since(port.name()),
@@ -209,7 +211,8 @@ void WhyAnswer::write_json() const {
 }
 
 void write_why(std::ostream& out, const WhyOptions& options,
-               const std::shared_ptr<watch::Instance>& instance, const watch::KeptPicture* kept) {
+               const std::shared_ptr<watch::Instance>& instance, const watch::KeptPicture* kept,
+               const wire::HostsDocument* hosts) {
   watch::Port port(instance, options.port);
   for (;;) {
     Look look = kept == nullptr ? port.look() : port.look_back(*kept);
@@ -218,13 +221,17 @@ void write_why(std::ostream& out, const WhyOptions& options,
     port.add_timeouts(look);
     const wire::Status status = instance->status();
     if (kept == nullptr) watch::add_gaps(port, look, status);
-    const WhyAnswer answer(options, port, std::move(look), std::move(*explanation), status, out);
+    watch::Fates fates;
+    if (hosts != nullptr) fates = fates_elsewhere(options, status, *hosts);
+    const WhyAnswer answer(options, port, std::move(look), std::move(*explanation), status,
+                           std::move(fates), out);
     answer.check_source();
     if (options.json) {
       answer.write_json();
     } else {
       answer.write_text();
       write_text(out, name_warnings(port.diagnostics()));
+      if (hosts != nullptr) write_imports_of(out, options.port, status, *hosts, *instance);
     }
     return;
   }

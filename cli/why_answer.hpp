@@ -17,6 +17,7 @@
 #include "rules/explain/tenure.hpp"
 #include "watch/obstacles.hpp"
 #include "watch/port.hpp"
+#include "wire/hosts.hpp"
 #include "wire/status.hpp"
 
 namespace arbiter::cli {
@@ -25,7 +26,8 @@ class WhyAnswer {
  public:
   // Keeps references.
   WhyAnswer(const WhyOptions& options, const watch::Port& port, watch::Look look,
-            rules::PortExplanation explanation, const wire::Status& status, std::ostream& out);
+            rules::PortExplanation explanation, const wire::Status& status, watch::Fates fates,
+            std::ostream& out);
 
   // Throws Error where the source is none of this port's.
   void check_source() const;
@@ -69,10 +71,11 @@ class WhyAnswer {
 };
 
 // The whole answer to `options`. Of activities, and of who wins, it says what the kept picture has,
-// if one is given; what the daemon's status knows is always of now. Throws as watch::Port does, and
-// Error.
+// if one is given; what the daemon's status knows is always of now. With `hosts` also what comes
+// from other hosts, or came. Throws as watch::Port does, and Error.
 void write_why(std::ostream& out, const WhyOptions& options,
                const std::shared_ptr<watch::Instance>& instance,
-               const watch::KeptPicture* kept = nullptr);
+               const watch::KeptPicture* kept = nullptr,
+               const wire::HostsDocument* hosts = nullptr);
 
 }  // namespace arbiter::cli

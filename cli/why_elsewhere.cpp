@@ -20,6 +20,8 @@
 #include "shm/clock.hpp"
 #include "shm/utf8.hpp"
 #include "watch/model_in_force.hpp"
+#include "watch/obstacles.hpp"
+#include "watch/past.hpp"
 #include "watch/port.hpp"
 #include "wire/document.hpp"
 #include "wire/link_call.hpp"
@@ -88,6 +90,28 @@ std::string component_text(const wire::Status& status, const std::string& source
   return shm::printable(text);
 }
 
+// Of a port, or a source, that is left: who had it open last and died; empty: that is not known.
+std::string death_there(const wire::Status& status, const watch::PortEnd& end, const auto* port) {
+  if (!watch::is_vacant(port)) return {};
+  const wire::DeathStatus* const death = watch::death_of(status, end, port->name);
+  return death == nullptr ? "" : watch::death_text(*death, status.now);
+}
+
+void write_death(std::ostream& out, const wire::Status& status, const std::string& source) {
+  const std::string text = death_there(status, watch::kOutputEnd, status.find_source(source));
+  if (!text.empty()) out << "  ! " << text << '\n';
+}
+
+// Why nothing of the winner reaches the port; empty: something does.
+std::string why_nothing_comes(const wire::Status& status, const wire::InputStatus& input) {
+  if (!input.winner) return {};
+  const watch::Sources unseen;
+  const watch::Obstacles obstacles(status, input.name, unseen, {}, {});
+  const std::string why = obstacles.why_nothing_comes_of(*input.winner);
+  const std::string death = death_there(status, watch::kInputEnd, &input);
+  return death.empty() ? why : why + "; " + death;
+}
+
 // The causes in one line each; because of which sources.
 std::vector<std::string> causes_of(const rules::PortExplanation& explanation,
                                    const std::string& source) {
@@ -125,13 +149,29 @@ wire::InputStatus only(wire::InputStatus input, const std::string& source) {
   return input;
 }
 
+// Of a port that nobody has open there.
+void write_where_it_is_open(std::ostream& out, const Elsewhere& there,
+                            const wire::InputStatus& input, const std::string& host) {
+  if (input.open || input.away_pid) return;
+  if (!input.winner) out << "  ! no component there has the port open: nothing is taken\n";
+  for (const wire::HostStatus& each : there.hosts.hosts) {
+    const auto& inputs = each.inputs;
+    const bool has_it = std::find(inputs.begin(), inputs.end(), input.name) != inputs.end();
+    if (!has_it || !each.is_up || each.host == host) continue;
+    const std::string name = shm::printable(each.host);
+    out << "  ! it is open on host " << name << ", which decides it for its component: arbiter why "
+        << input.name << " --host " << name << '\n';
+  }
+}
+
 void write_text(std::ostream& out, const Elsewhere& there, const wire::InputStatus& input,
                 const std::string& host) {
   const rules::PortExplanation explanation = explain(there, input.name);
   const wire::HostStatus* const found = there.hosts.find_host(host);
-  out << input.name << " is decided on host " << host << ", round trip "
-      << round_trip_text(found == nullptr ? std::nullopt : found->round_trip) << ", by "
-      << shm::printable(there.model.text()) << '\n';
+  const bool is_open = input.open || input.away_pid;
+  out << input.name << (is_open ? " is decided on host " : " is not open on host ") << host
+      << ", round trip " << round_trip_text(found == nullptr ? std::nullopt : found->round_trip)
+      << ", by " << shm::printable(there.model.text()) << '\n';
   if (!input.arbitrated) {
     out << "  not arbitrated: everything is delivered\n";
   } else if (input.cannot_deliver) {
@@ -139,8 +179,11 @@ void write_text(std::ostream& out, const Elsewhere& there, const wire::InputStat
         << " is selected, but cannot deliver: " << shm::printable(input.cannot_deliver->why)
         << '\n';
   } else {
-    out << "  " << (input.winner ? *input.winner + " wins" : "idle: no connection wins") << '\n';
+    const std::string why = why_nothing_comes(there.status, input);
+    out << "  " << (input.winner ? *input.winner + " wins" : "idle: no connection wins")
+        << (why.empty() ? "" : "; but nothing of it reaches the port: " + why) << '\n';
   }
+  write_where_it_is_open(out, there, input, host);
   for (const wire::ConnectionStatus& each : input.connections) {
     out << '\n'
         << each.source << "  " << (each.active ? "active" : "inactive")
@@ -149,12 +192,19 @@ void write_text(std::ostream& out, const Elsewhere& there, const wire::InputStat
     for (const std::string& cause : causes_of(explanation, each.source)) {
       out << "  " << shm::printable(cause) << '\n';
     }
+    write_death(out, there.status, each.source);
   }
   for (const wire::SensedStatus& each : input.senses) {
     out << '\n'
         << each.source << "  " << (each.active ? "active" : "inactive") << ", sensed  ["
         << component_text(there.status, each.source) << "]\n";
+    write_death(out, there.status, each.source);
   }
+}
+
+json death_there_json(const wire::Status& status, const std::string& source) {
+  const std::string text = death_there(status, watch::kOutputEnd, status.find_source(source));
+  return text.empty() ? json(nullptr) : json(text);
 }
 
 json json_of(const Elsewhere& there, const wire::InputStatus& input, const std::string& host) {
@@ -165,20 +215,27 @@ json json_of(const Elsewhere& there, const wire::InputStatus& input, const std::
                    {"round_trip_ns", nullptr},
                    {"generation", there.model.generation()},
                    {"arbitrated", input.arbitrated},
+                   {"open", input.open || input.away_pid},
                    {"winner", nullptr},
+                   {"nothing_comes_of_it", nullptr},
                    {"connections", json::array()},
                    {"senses", json::array()}};
   if (found != nullptr && found->round_trip) document["round_trip_ns"] = *found->round_trip;
   if (input.winner) document["winner"] = *input.winner;
+  const std::string why = why_nothing_comes(there.status, input);
+  if (!why.empty()) document["nothing_comes_of_it"] = why;
   for (const wire::ConnectionStatus& each : input.connections) {
     document["connections"].push_back({{"source", each.source},
                                        {"active", each.active},
                                        {"wins", each.winner},
                                        {"component", component_text(there.status, each.source)},
+                                       {"death", death_there_json(there.status, each.source)},
                                        {"causes", causes_of(explanation, each.source)}});
   }
   for (const wire::SensedStatus& each : input.senses) {
-    document["senses"].push_back({{"source", each.source}, {"active", each.active}});
+    document["senses"].push_back({{"source", each.source},
+                                  {"active", each.active},
+                                  {"death", death_there_json(there.status, each.source)}});
   }
   return document;
 }
@@ -323,17 +380,6 @@ void write_why_elsewhere(std::ostream& out, const WhyOptions& options, const std
   } else {
     write_text(out, there, input, host);
   }
-}
-
-void write_imports_of(std::ostream& out, const std::string& port, const wire::HostsDocument& hosts,
-                      watch::Instance& instance) {
-  const wire::Status status = instance.status();
-  const wire::InputStatus* const input = status.find_input(port);
-  if (input == nullptr) return;
-  std::vector<std::string> sources;
-  for (const auto& each : input->connections) sources.push_back(each.source);
-  for (const auto& each : input->senses) sources.push_back(each.source);
-  write_imports(out, sources, hosts, ages_in(instance));
 }
 
 }  // namespace arbiter::cli

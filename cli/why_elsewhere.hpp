@@ -10,7 +10,6 @@
 #include <vector>
 
 #include "cli/why_follow.hpp"
-#include "watch/instance.hpp"
 #include "wire/hosts.hpp"
 
 namespace arbiter::cli {
@@ -31,10 +30,5 @@ void write_why_elsewhere(std::ostream& out, const WhyOptions& options, const std
 // change came first, and what was shorter, it does not see. Returns the exit code. Throws as
 // write_why_elsewhere() at the beginning.
 int follow_elsewhere(const WhyOptions& options, const std::string& host);
-
-// Of the answer about a port of this host: which of its sources come from other hosts, and
-// how old they are.
-void write_imports_of(std::ostream& out, const std::string& port, const wire::HostsDocument& hosts,
-                      watch::Instance& instance);
 
 }  // namespace arbiter::cli

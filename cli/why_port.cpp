@@ -44,7 +44,7 @@ void WhyAnswer::write_port() const {
     out_
         << "  ! sources change faster than they can be read: this answer may mix several moments\n";
   }
-  if (look_.is_arbitrated && !model.has_texts()) {
+  if (look_.is_arbitrated && !model.has_texts() && !obstacles_.is_model_refused()) {
     out_ << "  ! the daemon took this model over from its predecessor (it was started without "
             "--model): it knows the decisions, but not the behaviours behind them\n";
   }

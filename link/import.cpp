@@ -71,6 +71,7 @@ void Import::look(bool is_open_here, SourceUse use, const OtherLinks& others) {
   const bool is_open_otherwise = (is_other_type || is_other_host) && is_open();
   if (choice != ImportChoice::kImport || is_open_otherwise) close();
   if (choice == ImportChoice::kSpokenHere) {
+    last_host_.clear();  // it was that of a component here since
     const std::lock_guard lock(mutex_);
     stream_.pause();
   }

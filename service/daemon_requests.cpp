@@ -251,7 +251,7 @@ void Daemon::answer_status(shm::Nanoseconds now) {
     document = make_document(status_document(
         {instance_, board_, changes_.library(), changes_.in_force(), changes_.history(), names_,
          registry_, switchboard_, takeover_.strangers(), takeover_.deaths(), refusals_,
-         clients_.size(), changes_.reloads_refused()},
+         clients_.size(), changes_.reloads_refused(), changes_.refused_files()},
         now));
   } catch (const std::exception& error) {  // no descriptors are left
     why_not = error.what();

@@ -104,6 +104,7 @@ class Document {
     status.instance = of_.instance;
     status.pid = getpid();
     status.directory = working_directory();  // that relative paths are meant from
+    status.now = now_;
     status.model = model();
     for (const LoadedModel& each : of_.library.models()) {
       status.models.push_back(loaded(*each.model));
@@ -131,7 +132,8 @@ class Document {
     const std::string name = of_.models.name();
     const auto files = of_.model == nullptr ? rules::ModelFiles() : of_.model->files;
     return {snapshot_.generation, name.empty() ? std::nullopt : std::optional(name),
-            of_.reloads_refused, files.models, files.application};
+            of_.reloads_refused,  files.models,
+            files.application,    of_.refused};
   }
 
   // After a rollback the model in force has the name of one that is loaded, but is not that one.

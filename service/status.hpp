@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 
 #include "service/models/board.hpp"
@@ -10,6 +11,7 @@
 #include "service/ports/switchboard.hpp"
 #include "service/takeover/deaths.hpp"
 #include "service/takeover/strangers.hpp"
+#include "wire/status.hpp"
 
 namespace arbiter::service {
 
@@ -27,6 +29,7 @@ struct StatusOf {
   const Refusals& refusals;
   std::size_t clients = 0;
   std::uint64_t reloads_refused = 0;
+  std::optional<wire::RefusedFilesStatus> refused;  // of `model`, where that is a predecessor's
 };
 
 // Reads segments that others are writing; every value is right for some moment of the call.

@@ -355,6 +355,7 @@ const std::vector<std::string>& finding_codes() {
                                               "replaced-program",
                                               "time-namespace",
                                               "stranger",
+                                              "model-refused",
                                               "dead-component",
                                               "type-mismatch",
                                               "cannot-deliver",

@@ -37,6 +37,9 @@ using Findings = std::vector<Finding>;
 // The processes that a status names.
 [[nodiscard]] Findings examine_processes(const Machine& machine, const wire::Status& status);
 
+// Of a daemon that keeps the model of the last one, because its own files were refused.
+[[nodiscard]] Findings examine_model(const wire::Status& status);
+
 // Components that died, of whose ports the model wants one that nobody has open.
 [[nodiscard]] Findings examine_deaths(const wire::Status& status);
 

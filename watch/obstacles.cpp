@@ -75,10 +75,18 @@ bool contains(const std::vector<std::string>& names, const std::string& name) {
 }
 
 // "; gaze-control (pid 4711) had it open, and died 3 s ago", or nothing.
-std::string death_text(const wire::DeathStatus* death) {
-  if (death == nullptr) return "";
-  return "; " + process_text(*death) + " had it open, and died " +
-         span_text(shm::monotonic_now() - death->at) + " ago";
+std::string and_death_text(const wire::DeathStatus* death) {
+  return death == nullptr ? "" : "; " + death_text(*death, shm::monotonic_now());
+}
+
+void add_refused_model(const wire::ModelStatus& model, std::vector<Obstacle>& result) {
+  if (!model.refused) return;
+  result.push_back(
+      {"model-refused",
+       "the files of --model were refused, so the daemon keeps the model of the last one: it knows "
+       "the decisions, but not the behaviours behind them; mend the files, then run arbiter "
+       "reload; the first error: " +
+           shm::printable(model.refused->why)});
 }
 
 void add_refusal(const wire::RefusalStatus* refusal, std::vector<Obstacle>& result) {
@@ -112,12 +120,14 @@ std::string unmentioned_text(const auto& port) {
 }  // namespace
 
 Obstacles::Obstacles(const wire::Status& status, const std::string& port, const Sources& sources,
-                     std::vector<std::string> known_sources, std::vector<std::string> known_ports)
+                     std::vector<std::string> known_sources, std::vector<std::string> known_ports,
+                     Fates fates)
     : status_(status),
       port_(port),
       sources_(sources),
       known_sources_(std::move(known_sources)),
       known_ports_(std::move(known_ports)),
+      fates_(std::move(fates)),
       input_(status.find_input(port)) {}
 
 std::vector<Obstacle> Obstacles::of_port() const {
@@ -130,10 +140,11 @@ std::vector<Obstacle> Obstacles::of_port() const {
     add_away(*input_->away_pid, result);
   } else if (stranger == nullptr) {
     result.push_back({"port-not-open", "no component has the port open: nothing is taken" +
-                                           death_text(death_of(status_, kInputEnd, port_))});
+                                           and_death_text(death_of(status_, kInputEnd, port_))});
     add_refusal(refusal_of(status_, kInputEnd, port_), result);
   }
   if (stranger != nullptr) add_unknown(*stranger, result);
+  add_refused_model(status_.model, result);
   add_other_strangers(result);
   add_port_name(result);
   return result;
@@ -267,12 +278,15 @@ void Obstacles::add_publisher(const std::string& source, std::vector<Obstacle>& 
   if (stranger != nullptr) return;
   const auto* refusal = refusal_of(status_, kOutputEnd, source);
   const auto* death = death_of(status_, kOutputEnd, source);
+  const auto fate = fates_.find(source);
   const std::string not_open = "no component has the output port open";
   if (refusal != nullptr) {
     result.push_back({"output-not-open", not_open});
     add_refusal(refusal, result);
   } else if (death != nullptr) {
-    result.push_back({"output-not-open", not_open + " any longer" + death_text(death)});
+    result.push_back({"output-not-open", not_open + " any longer" + and_death_text(death)});
+  } else if (fate != fates_.end()) {
+    result.push_back({"output-not-open", not_open + " any longer; " + fate->second});
   } else if (state.word == shm::kNeverActive) {
     result.push_back({"output-not-open",
                       not_open + ", and it was never active: its component does not run, or opens "

@@ -1,6 +1,7 @@
 // What besides the rules keeps samples from getting through: what the daemon's status knows.
 #pragma once
 
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -16,12 +17,16 @@ struct Obstacle {
   bool is_wrong = true;  // else it is worth knowing, and may be as it should be
 };
 
+// By source: what has become of it on the host that it came from.
+using Fates = std::map<std::string, std::string>;
+
 class Obstacles {
  public:
   // Keeps references, and looks into /proc. `known_sources` and `known_ports`: those that the model
   // mentions; empty where that is not known.
   Obstacles(const wire::Status& status, const std::string& port, const Sources& sources,
-            std::vector<std::string> known_sources, std::vector<std::string> known_ports);
+            std::vector<std::string> known_sources, std::vector<std::string> known_ports,
+            Fates fates = {});
 
   [[nodiscard]] std::vector<Obstacle> of_port() const;
   [[nodiscard]] std::vector<Obstacle> of_connection(const std::string& source) const;
@@ -32,6 +37,8 @@ class Obstacles {
   [[nodiscard]] std::string why_it_cannot_deliver(const std::string& source) const;
   // Why nothing of a winner reaches the port; empty where something does, as far as is known.
   [[nodiscard]] std::string why_nothing_comes_of(const std::string& source) const;
+  // A predecessor's model is in force, because the daemon's own was refused: of_port() says it.
+  [[nodiscard]] bool is_model_refused() const { return status_.model.refused.has_value(); }
   // Nobody has it open, nothing has ever arrived, and nothing else could be meant by the name.
   [[nodiscard]] bool is_out_of_use(const std::string& source) const;
   // "nav (pid 12)", empty where nobody has it open.
@@ -55,6 +62,7 @@ class Obstacles {
   const std::string port_;
   const Sources& sources_;
   const std::vector<std::string> known_sources_, known_ports_;
+  const Fates fates_;
   const wire::InputStatus* input_;  // null: the status does not have it
 };
 

@@ -2,6 +2,9 @@
 
 #include <algorithm>
 
+#include "watch/process.hpp"
+#include "watch/span.hpp"
+
 namespace arbiter::watch {
 namespace {
 
@@ -18,6 +21,11 @@ const wire::DeathStatus* death_of(const wire::Status& status, const PortEnd& end
                    [&](const auto& each) { return has_name(each.*end.left_open, port); });
   const bool is_last = found != status.deaths.end() && !has_name(found->opened_since, port);
   return is_last ? &*found : nullptr;
+}
+
+std::string death_text(const wire::DeathStatus& death, std::optional<shm::Nanoseconds> now) {
+  return process_text(death) + " had it open, and died" +
+         (now ? ' ' + span_text(*now - death.at) + " ago" : "");
 }
 
 bool has_died_since(const wire::Status& status, const PortEnd& end,

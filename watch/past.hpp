@@ -27,6 +27,11 @@ inline constexpr PortEnd kInputEnd{&wire::RefusalStatus::input, &wire::DeathStat
 [[nodiscard]] const wire::DeathStatus* death_of(const wire::Status& status, const PortEnd& end,
                                                 const std::string& port);
 
+// "gaze-control (pid 4711) had it open, and died 3 s ago". `now`: on the clock of that status;
+// nothing: it does not say it.
+[[nodiscard]] std::string death_text(const wire::DeathStatus& death,
+                                     std::optional<shm::Nanoseconds> now);
+
 // Whether whoever kept the port from those who asked for it then has died since.
 [[nodiscard]] bool has_died_since(const wire::Status& status, const PortEnd& end,
                                   const wire::RefusalStatus& refusal);

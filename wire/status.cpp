@@ -72,12 +72,18 @@ void describe(auto& field, Is<SampleType> auto& of) {
   field("alignment", of.alignment);
 }
 
+void describe(auto& field, Is<RefusedFilesStatus> auto& of) {
+  field("files", of.files);
+  field("why", of.why);
+}
+
 void describe(auto& field, Is<ModelStatus> auto& of) {
   field("generation", of.generation);
   field("name", of.name);
   field.counter("reloads_refused", of.reloads_refused);
   field("files", of.files);
   field("application", of.application);
+  field.maybe("refused", of.refused);
 }
 
 void describe(auto& field, Is<LoadedModelStatus> auto& of) {
@@ -207,6 +213,7 @@ void describe(auto& field, Is<Status> auto& of) {
   field("instance", of.instance);
   field("pid", of.pid);
   field("directory", of.directory);
+  field.maybe("at_ns", of.now);
   field("model", of.model);
   field("models", of.models);
   field("history", of.history);

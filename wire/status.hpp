@@ -32,12 +32,19 @@ struct SampleType {
   std::uint64_t alignment = 0;
 };
 
+// Why the daemon has a predecessor's model in force, and not its own.
+struct RefusedFilesStatus {
+  std::vector<std::string> files;  // of all its models, as it was given them
+  std::string why;                 // the first error, and where it is
+};
+
 struct ModelStatus {
   std::uint64_t generation = 0;  // 0: no model is in force
   std::optional<std::string> name;
   std::uint64_t reloads_refused = 0;
   std::vector<std::string> files;
   std::optional<std::string> application;
+  std::optional<RefusedFilesStatus> refused;  // none: it has been given no files, or has read them
 };
 
 struct LoadedModelStatus {
@@ -195,7 +202,8 @@ struct InputStatus {
 struct Status {
   std::string instance;
   std::int32_t pid = 0;
-  std::string directory;  // empty: not known
+  std::string directory;                // empty: not known
+  std::optional<shm::Nanoseconds> now;  // CLOCK_MONOTONIC there; an older daemon does not say it
   ModelStatus model;
   std::vector<LoadedModelStatus> models;
   std::vector<PastModelStatus> history;  // the latest first

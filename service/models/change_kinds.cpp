@@ -52,6 +52,7 @@ void ModelChanges::read_first(int stop_descriptor, const std::function<bool()>& 
   Reading reading = compiler_.take();
   if (reading.findings.has_errors()) {
     not_read_at_start_ = reading.findings.why_refused();
+    why_refused_ = reading.findings.first_error();
     const bool lacks_policy = gate_.has_file() && !reading.policy;
     if (lacks_policy || !may_inherit) throw BadModel("not started: " + not_read_at_start_);
     reading.models.clear();
@@ -140,10 +141,16 @@ void ModelChanges::reserve_tables(const Library& library) {
 const LoadedModel& ModelChanges::loaded_model(const std::string& name) const {
   const LoadedModel* const found = library_.find(name);
   if (found != nullptr) return *found;
+  const std::string loaded =
+      !library_.models().empty() ? "; there are: " + library_.names()
+      : why_refused_.empty()     ? "; none is loaded"
+                             : "; none is loaded, because the files of --model were refused, and "
+                               "the last daemon's model stays in force; mend them, then run "
+                               "arbiter reload; the first error: " +
+                                   why_refused_;
   // The name is a client's: it must not break lines.
   throw std::runtime_error(
-      "there is no model " + (is_model_name(name) ? '"' + name + '"' : "of that name") +
-      (library_.models().empty() ? "; none is loaded" : "; there are: " + library_.names()) +
+      "there is no model " + (is_model_name(name) ? '"' + name + '"' : "of that name") + loaded +
       (name.ends_with(".xml") ? "; arbiterd --model NAME=FILE gives a file a name" : ""));
 }
 

@@ -76,6 +76,7 @@ void ModelChanges::start(bool is_fresh) {
   } catch (const std::exception& error) {
     if (is_fresh) throw;
     ++reloads_refused_;
+    if (why_refused_.empty()) why_refused_ = error.what();
     log_event({EventKind::kChangeRefused, {}, {}, {}, inherited}, log::level::err,
               "the last daemon's model stays in force: {}; `arbiter reload` reads the files again",
               error.what());
@@ -122,7 +123,10 @@ void ModelChanges::attempt(Swap& swap, const std::function<void()>& step) {
   try {
     step();
   } catch (const std::exception& error) {
-    if (swap.change.kind == Change::Kind::kReload) ++reloads_refused_;
+    if (swap.change.kind == Change::Kind::kReload) {
+      ++reloads_refused_;
+      if (!why_refused_.empty()) why_refused_ = error.what();
+    }
     // What is found in files is in the log when they have been read.
     const std::string why =
         swap.findings.has_errors() ? swap.findings.why_refused() : std::string(error.what());
@@ -193,6 +197,7 @@ void ModelChanges::put_in_force() {
   board_.put_in_force();
   const ModelPointer before = std::exchange(in_force_, swap.to).model;
   const Model& model = *in_force_.model;
+  why_refused_.clear();
   if (swap.library) library_ = *swap.library;
   const auto snapshot = board_.in_force();
   continuity_.change(before == nullptr ? nullptr : &before->compiled, model.compiled, last_since);
@@ -236,6 +241,15 @@ void ModelChanges::remember(const Swap& swap, std::uint64_t generation) {
                 swap.change.by,
                 {},
                 in_force_.model});
+}
+
+std::optional<wire::RefusedFilesStatus> ModelChanges::refused_files() const {
+  if (why_refused_.empty()) return std::nullopt;
+  wire::RefusedFilesStatus refused{{}, why_refused_};
+  for (const NamedFiles& each : options_.files) {
+    refused.files.insert(refused.files.end(), each.files.models.begin(), each.files.models.end());
+  }
+  return refused;
 }
 
 const shm::FileDescriptor& ModelChanges::document() {

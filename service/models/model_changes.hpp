@@ -33,6 +33,7 @@
 #include "service/ports/introductions.hpp"
 #include "service/ports/port_names.hpp"
 #include "service/ports/switchboard.hpp"
+#include "wire/status.hpp"
 
 namespace arbiter::service {
 
@@ -90,6 +91,8 @@ class ModelChanges {
   [[nodiscard]] const ModelPointer& in_force() const { return in_force_.model; }
   [[nodiscard]] const History& history() const { return history_; }
   [[nodiscard]] std::uint64_t reloads_refused() const { return reloads_refused_; }
+  // Nothing: there are no files, or they have been read.
+  [[nodiscard]] std::optional<wire::RefusedFilesStatus> refused_files() const;
   // Of the model in force, for those who explain it. Throws std::system_error, std::runtime_error.
   [[nodiscard]] const shm::FileDescriptor& document();
 
@@ -145,6 +148,7 @@ class ModelChanges {
   bool has_settled_ = false;
   std::vector<ModelPointer> read_at_start_;  // until they are put into the library
   std::string not_read_at_start_;            // why there is none
+  std::string why_refused_;                  // why a predecessor's is in force in its place
   Library library_;
   LoadedModel in_force_;  // null: none, or a predecessor's
   History history_;

@@ -124,6 +124,35 @@ TEST_F(WhyOfTwoModels, AfterARollbackDoesNotAdviseToGoBackToWhatWasFledFrom) {
   EXPECT_EQ(why_json({"/arm"})["model"]["is_older"], false);
 }
 
+TEST_F(WhyOfTwoModels, OfADaemonWhoseFilesWereRefusedTellsWhichErrorKeepsThemOut) {
+  Node node("test");  // it keeps the model in force
+  auto port = node.output_port<int>("/a");
+  daemon_.kill();
+  files_.write("second.xml", "<behaviors><behaviour/></behaviors>");
+  daemon_.restart();
+  const auto error = AllOf(HasSubstr("the files of --model were refused"),
+                           HasSubstr("second.xml:1:12: "), HasSubstr("arbiter reload"));
+  const std::string text = why({"/arm"});
+  EXPECT_THAT(text, AllOf(error, HasSubstr("! the files"), Not(HasSubstr("without --model"))));
+  EXPECT_THAT(codes(why_json({"/arm"})["obstacles"]), testing::Contains("model-refused"));
+  EXPECT_THAT(arbiter({"status"}).out, error);
+  EXPECT_THAT(arbiter({"switch"}).out, error);
+  const auto refused = arbiter({"switch", "second"});
+  EXPECT_EQ(refused.exit_code, 1);
+  EXPECT_THAT(refused.err, AllOf(HasSubstr("there is no model \"second\"; none is loaded"), error));
+  const auto doctor = arbiter({"doctor"});
+  EXPECT_EQ(doctor.exit_code, 1);
+  EXPECT_THAT(doctor.out, AllOf(error, HasSubstr("[model-refused]"), HasSubstr("first.xml, ")));
+  files_.write("second.xml", "<behaviors>\n<behaviour/></behaviors>");
+  EXPECT_EQ(arbiter({"reload"}).exit_code, 1);
+  EXPECT_THAT(why({"/arm"}), HasSubstr("second.xml:2:1: ")) << "as it was read last";
+  files_.write("second.xml", model_of("/arm", "/b"));
+  EXPECT_EQ(arbiter({"reload"}).exit_code, 0);
+  EXPECT_THAT(why({"/arm"}), Not(HasSubstr("refused")));
+  EXPECT_THAT(arbiter({"doctor"}).out, Not(HasSubstr("model-refused")));
+  EXPECT_EQ(arbiter({"switch", "second"}).exit_code, 0);
+}
+
 TEST(WhyModel, TellsThatThereIsNone) {
   Daemon daemon(kNoRules, {.without_model = true});
   Node node("test");

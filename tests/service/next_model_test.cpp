@@ -90,7 +90,12 @@ TEST_F(ChangingModels, OfABrokenFileTheModelInForceStaysWithTheNextDaemon) {
     ASSERT_EQ(other.tell("output /b"), "open");
     EXPECT_EQ(other.tell("publish /b 2"), "0 0 0") << "which the model in force does not mention";
   }
-  expect_refusal(arbiter({"switch", "other"}), "there is no model \"other\"; none is loaded");
+  const auto refused = arbiter({"switch", "other"});
+  EXPECT_EQ(refused.exit_code, 1);
+  EXPECT_THAT(refused.err,
+              HasSubstr("there is no model \"other\"; none is loaded, because the files of --model "
+                        "were refused, and the last daemon's model stays in force; mend them, then "
+                        "run arbiter reload; the first error: "));
   EXPECT_EQ(arbiter({"reload"}).exit_code, 1);
   daemon.write_model(only("c"));
   EXPECT_EQ(arbiter({"reload"}).exit_code, 0);

@@ -47,6 +47,11 @@ void see_models(ObservedFields& observed) {
   daemon.kill();
   daemon.restart();
   observed.see(daemon.status());
+  // One that knows no more of it, because its own files are refused.
+  daemon.kill();
+  daemon.write_model("<behaviors>");
+  daemon.restart();
+  observed.see(daemon.status());
 }
 
 void see_no_model(ObservedFields& observed) {

@@ -221,6 +221,19 @@ TEST(Doctor, FindsWhoDiedAndWasNotStartedAgain) {
 }
 
 // full_status() has a daemon (42), components (44 and 46), some away (45 and 47), and a stranger.
+TEST(Doctor, FindsADaemonWhoseModelWasRefused) {
+  wire::Status status;
+  status.model.generation = 7;
+  EXPECT_THAT(watch::examine_model(status), IsEmpty());
+  status.model.refused = {{"a.xml", "b.xml"}, "the model work has errors: b.xml:3:1: no"};
+  const Findings findings = watch::examine_model(status);
+  ASSERT_THAT(codes_of(findings), ElementsAre("model-refused"));
+  EXPECT_EQ(findings[0].what,
+            "the files of --model were refused (a.xml, b.xml), so the daemon keeps model 7 of the "
+            "last one: the model work has errors: b.xml:3:1: no");
+  EXPECT_THAT(findings[0].mend, HasSubstr("arbiter reload"));
+}
+
 TEST(Doctor, LooksAtTheProcessesOfTheStatus) {
   const MadeUpMachine machine;
   wire::Status status = full_status();

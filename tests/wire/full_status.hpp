@@ -10,8 +10,11 @@ inline wire::Status full_status() {
   status.instance = "x";
   status.pid = 42;
   status.directory = "/home/robot";
+  status.now = 16;
   status.clients = 3;
-  status.model = {7, "work", 2, {"a.xml", "b.xml"}, "app.xml"};
+  status.model = {7,         "work",
+                  2,         {"a.xml", "b.xml"},
+                  "app.xml", wire::RefusedFilesStatus{{"c.xml"}, "c.xml:1:1: not so"}};
   status.models = {{"work", true, false, {"a.xml"}, "app.xml"}, {"play", false, false, {}, {}}};
   status.history = {
       {7, 5, "work", {"a.xml"}, "app.xml", 1'795'323'981'354, "reload", "robot", "none", true},
