@@ -38,6 +38,14 @@ std::string_view verb_for(std::string_view word) {
   return {};
 }
 
+// What a verb has no option for, and another verb does.
+std::vector<arbiter::command_line::Elsewhere> options_elsewhere() {
+  return {{"arbiter why",
+           {"--at", "--recording"},
+           "it asks a running daemon; of what was recorded, ask: "
+           "arbiter simulate --recording FILE --why=PORT --at TIME"}};
+}
+
 // CLI11 would say that a verb is missing.
 bool knows_verb(const CLI::App& app, const std::string& word) {
   if (word.empty() || word.front() == '-') return true;
@@ -123,7 +131,7 @@ int run(int argc, char** argv) {
   arbiter::cli::add_stop(app, exit_code);
   add_exit_codes(app);
   arbiter::command_line::refuse_empty(app, {"--text", "--hex"});  // a sample of no bytes
-  app.failure_message(arbiter::command_line::wrong_use_text);
+  app.failure_message(arbiter::command_line::wrong_use_text_with(options_elsewhere()));
   std::vector<std::string> words = words_of(argc, argv);
   if (!words.empty() && !knows_verb(app, words.front())) return kWrongUse;
   std::reverse(words.begin(), words.end());  // as CLI11 wants them

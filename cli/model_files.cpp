@@ -39,8 +39,8 @@ std::optional<Model> checked(rules::RuleSet rules, rules::CompiledModel compiled
 }  // namespace
 
 std::optional<Model> load_model(const rules::ModelFiles& files, rules::Diagnostics& diagnostics,
-                                rules::Budget& budget) {
-  rules::RuleSet rules = rules::load(files, diagnostics);
+                                rules::Budget& budget, rules::Keep keep) {
+  rules::RuleSet rules = rules::load(files, diagnostics, keep);
   rules::CompiledModel compiled = rules::compile(rules, diagnostics, budget);
   return checked(std::move(rules), std::move(compiled), diagnostics);
 }

@@ -27,7 +27,7 @@ struct Model {
 
 // Reads, compiles and proves a model; nothing if that finds an error.
 std::optional<Model> load_model(const rules::ModelFiles& files, rules::Diagnostics& diagnostics,
-                                rules::Budget& budget);
+                                rules::Budget& budget, rules::Keep keep = rules::Keep::kRules);
 // With a budget of its own, as check has it, so that what is accepted there is accepted everywhere;
 // and with its progress on standard error. Drops notes: see Diagnostics::drop_notes.
 std::optional<Model> load_model(const rules::ModelFiles& files, rules::Diagnostics& diagnostics,

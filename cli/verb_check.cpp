@@ -84,6 +84,7 @@ const std::vector<std::string_view> silenceable{"behaviour-on-two-hosts",
                                                 "two-owners",
                                                 "unmentioned-port",
                                                 "unreachable-children",
+                                                "unused-define",
                                                 "wrong-end"};
 
 std::string problem_of_code(std::string& code) {
@@ -226,7 +227,8 @@ int check(const CheckOptions& options) {
   rules::Budget budget(rules::Budget::steps_of(options.effort));
   ProgressLine progress;
   budget.watch(progress.watch());
-  const auto model = load_model(options.files, diagnostics, budget);
+  const auto keep = options.hosts.empty() ? rules::Keep::kRules : rules::Keep::kProvenance;
+  const auto model = load_model(options.files, diagnostics, budget, keep);
   const auto statements =
       judge_statements(options, model ? &model->compiled : nullptr, diagnostics, budget);
   if (model) {

@@ -40,7 +40,10 @@ void add_rules(CLI::App& app, int& exit_code) {
       app.add_subcommand("rules", "Show the rules that Arbiter extracts from a model, by port");
   add_model_options(*verb, options->files);
   verb->add_flag("--json", options->json, "Write them as JSON");
-  verb->footer("Example:\n  arbiter rules search_and_track.xml");
+  verb->footer(
+      "Example:\n  arbiter rules search_and_track.xml\n\n"
+      "It proves nothing: rules that can hold together are shown, too. `arbiter check` finds "
+      "them.");
   verb->callback([options, &exit_code] { exit_code = show_rules(*options); });
 }
 

@@ -20,6 +20,14 @@
 #include "shm/utf8.hpp"
 
 namespace arbiter::command_line {
+
+// Options that a verb does not have, and what does what they ask for.
+struct Elsewhere {
+  std::string_view verb;  // as it is typed: "arbiter why"
+  std::vector<std::string_view> options;
+  std::string_view hint;  // said once for all of them
+};
+
 namespace wrong_use {
 
 // The verb that was typed, and its own verb if it has some: "arbiter recording winners".
@@ -86,14 +94,38 @@ inline std::string suggestion(const std::string& word, const std::vector<std::st
   return similar ? "; did you mean " + rules::quote(*similar) + '?' : "";
 }
 
-inline std::string text_of_option(const CLI::App& verb, const std::string& name,
-                                  const std::string& option) {
-  return name + " has no option " + rules::quote(option) + suggestion(option, options_of(verb));
+// Null: nothing is known of the option.
+inline const Elsewhere* find_elsewhere(const std::string& verb, const std::string& option,
+                                       const std::vector<Elsewhere>& elsewhere) {
+  for (const Elsewhere& each : elsewhere) {
+    const auto& options = each.options;
+    if (each.verb != verb) continue;
+    if (std::find(options.begin(), options.end(), option) != options.end()) return &each;
+  }
+  return nullptr;
+}
+
+// A line for each of these that the verb does not have, or for those with one hint.
+inline std::vector<std::string> texts_of_options(const CLI::App& verb, const std::string& name,
+                                                 const std::vector<std::string>& options,
+                                                 const std::vector<Elsewhere>& elsewhere) {
+  std::vector<std::string> lines;
+  std::vector<const Elsewhere*> said;
+  for (const std::string& option : options) {
+    const Elsewhere* const known = find_elsewhere(name, option, elsewhere);
+    if (known != nullptr && std::find(said.begin(), said.end(), known) != said.end()) continue;
+    if (known != nullptr) said.push_back(known);
+    lines.push_back(name + " has no option " + rules::quote(option) +
+                    (known != nullptr ? "; " + std::string(known->hint)
+                                      : suggestion(option, options_of(verb))));
+  }
+  return lines;
 }
 
 // Of options in front of the verb that has them: `arbiter --instance x status`; or that no verb
 // has. Empty: there is none.
-inline std::string text_of_early_options(const CLI::App& app, const Typed& typed) {
+inline std::string text_of_early_options(const CLI::App& app, const Typed& typed,
+                                         const std::vector<Elsewhere>& elsewhere) {
   const bool is_typed = typed.verb != &app;
   const std::vector<std::string> words = is_typed ? typed.before : app.remaining();
   const auto verbs = verbs_of(app);
@@ -104,7 +136,7 @@ inline std::string text_of_early_options(const CLI::App& app, const Typed& typed
                  : std::any_of(verbs.begin(), verbs.end(),
                                [&](const CLI::App* each) { return has_option(*each, option); });
     if (!is_known && !is_typed) continue;
-    if (!is_known) return text_of_option(*typed.verb, typed.name, option);
+    if (!is_known) return texts_of_options(*typed.verb, typed.name, {option}, elsewhere).front();
     std::string line = is_typed ? typed.name : app.get_name() + " VERB";
     for (const std::string& each : words) line += ' ' + shell_word(each);
     const auto options = typed.verb->get_options();
@@ -225,8 +257,9 @@ inline std::string text_of(const CLI::Error& error, const Typed& typed,
 }
 
 inline std::vector<std::string> lines_of(const CLI::App& app, const Typed& typed,
-                                         const CLI::Error& error) {
-  const std::string early = text_of_early_options(app, typed);
+                                         const CLI::Error& error,
+                                         const std::vector<Elsewhere>& elsewhere) {
+  const std::string early = text_of_early_options(app, typed, elsewhere);
   if (!early.empty()) return {early};
   const auto left = typed.verb->remaining();
   if (typed.verb != &app && lacks_verb(*typed.verb) && !words_in(left).empty()) {
@@ -234,10 +267,8 @@ inline std::vector<std::string> lines_of(const CLI::App& app, const Typed& typed
   }
   // What stands behind an unknown option is probably its value, and what is missing may be meant by
   // it.
-  std::vector<std::string> lines;
-  for (const std::string& option : options_in(left)) {
-    lines.push_back(text_of_option(*typed.verb, typed.name, option));
-  }
+  std::vector<std::string> lines =
+      texts_of_options(*typed.verb, typed.name, options_in(left), elsewhere);
   if (lines.empty()) lines.push_back(text_of(error, typed, app.get_name()));
   return lines;
 }
@@ -246,13 +277,18 @@ inline std::vector<std::string> lines_of(const CLI::App& app, const Typed& typed
 
 // With its end of line, made printable: what was typed may hold anything. As
 // CLI::App::failure_message() takes it.
+[[nodiscard]] inline auto wrong_use_text_with(std::vector<Elsewhere> elsewhere) {
+  return [elsewhere = std::move(elsewhere)](const CLI::App* app, const CLI::Error& error) {
+    const wrong_use::Typed typed = wrong_use::typed_verb(*app);
+    std::string text;
+    for (const std::string& line : wrong_use::lines_of(*app, typed, error, elsewhere)) {
+      text += shm::printable(line) + '\n';
+    }
+    return text + "Run `" + typed.name + " --help` for more information.\n";
+  };
+}
 [[nodiscard]] inline std::string wrong_use_text(const CLI::App* app, const CLI::Error& error) {
-  const wrong_use::Typed typed = wrong_use::typed_verb(*app);
-  std::string text;
-  for (const std::string& line : wrong_use::lines_of(*app, typed, error)) {
-    text += shm::printable(line) + '\n';
-  }
-  return text + "Run `" + typed.name + " --help` for more information.\n";
+  return wrong_use_text_with({})(app, error);
 }
 
 }  // namespace arbiter::command_line

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "rules/ask/instants.hpp"
+#include "rules/ask/negation_places.hpp"
 #include "rules/model/polarity.hpp"
 #include "rules/text/duration.hpp"
 #include "rules/text/names.hpp"
@@ -53,13 +54,14 @@ struct RemoteUse {
   std::vector<std::string> required_at;  // ports, as below
   std::vector<std::string> negated_at;
   std::vector<std::string> freed;  // "/Rest/pos:o at /Arm/pos:i": what waits for its silence
+  Location negation;               // that lets the first of these wait
 };
 
 class AcrossHosts {
  public:
   AcrossHosts(const RuleSet& rules, const SourceUses& uses, const HostPlaces& places,
               Diagnostics& diagnostics)
-      : rules_(rules), uses_(uses), places_(places), diagnostics_(diagnostics) {}
+      : rules_(rules), uses_(uses), places_(places), negations_(rules), diagnostics_(diagnostics) {}
 
   void find() {
     for (const PortRules& port : rules_.ports) {
@@ -71,7 +73,7 @@ class AcrossHosts {
       if (remote == remote_.end()) continue;
       const shm::Nanoseconds timeout = rules_.timeout_of(source);
       if (timeout == shm::kForever) refuse_forever(source, use, remote->second);
-      warn_of_negation(source, use, remote->second, timeout);
+      warn_of_negation(source, remote->second, timeout);
     }
     note_behaviours();
   }
@@ -89,7 +91,9 @@ class AcrossHosts {
       silent.insert(before.negated().begin(), before.negated().end());
       for (const std::string& source : silent) {
         if (source == rule.source || !places_.are_apart(source, port.port)) continue;
-        remote_[source].freed.push_back(rule.source + " at " + port.port);
+        RemoteUse& remote = remote_[source];
+        if (remote.freed.empty()) remote.negation = negations_.find(source, port, rule);
+        remote.freed.push_back(rule.source + " at " + port.port);
         negated.insert(source);
       }
       if (!port.first_wins) continue;
@@ -135,7 +139,7 @@ class AcrossHosts {
         {.ports = remote.required_at, .source = source});
   }
 
-  void warn_of_negation(const std::string& source, const SourceUse& use, const RemoteUse& remote,
+  void warn_of_negation(const std::string& source, const RemoteUse& remote,
                         shm::Nanoseconds timeout) {
     if (remote.negated_at.empty()) return;
     const std::string what_happens =
@@ -143,7 +147,7 @@ class AcrossHosts {
             ? ". What begins or ends while the network is cut is not known there: "
             : ". A cut network counts as its silence there: after " + to_string(timeout) + ", ";
     diagnostics_.warning(
-        "negated-across-hosts", use.where,
+        "negated-across-hosts", remote.negation,
         source + " is on " + enumerate(places_.of_source(source)) + ", and a rule at " +
             at_hosts(remote.negated_at, places_) + " requires it to be inactive" + what_happens +
             first_of(remote.freed) + " may win although " + source +
@@ -170,6 +174,7 @@ class AcrossHosts {
   const RuleSet& rules_;
   const SourceUses& uses_;
   const HostPlaces& places_;
+  NegationPlaces negations_;
   Diagnostics& diagnostics_;
   std::map<std::string, RemoteUse> remote_;
 };

@@ -36,6 +36,7 @@ class PortInquiry {
       result.is_known = result.is_arbitrated = true;
       result.first_wins = at->first_wins;
       gather_parts();
+      winner_ = winner_of(*at);
       for (const ConnectionRule& rule : at->rules) add(rule, *at, result);
       add_senses(*at, result);
     }
@@ -81,12 +82,30 @@ class PortInquiry {
     }
   }
 
+  [[nodiscard]] const std::string* winner_of(const PortRules& port) const {
+    const auto winner =
+        std::find_if(port.rules.begin(), port.rules.end(), [&](const ConnectionRule& rule) {
+          return is_active_(rule.source) && evaluate(*rule.condition, is_active_);
+        });
+    return winner == port.rules.end() ? nullptr : &winner->source;
+  }
+
+  // Who wins is what one sees: of several causes, each of which is enough, it stands in front.
+  void put_winner_first(std::vector<Cause>& causes) const {
+    if (winner_ == nullptr) return;
+    std::stable_partition(causes.begin(), causes.end(), [&](const Cause& cause) {
+      return std::find(cause.because.begin(), cause.because.end(), Literal{*winner_, true}) !=
+             cause.because.end();
+    });
+  }
+
   void add(const ConnectionRule& rule, const PortRules& rules, PortExplanation& port) {
     ConnectionExplanation result;
     result.source = rule.source;
     result.has_rule = true;
     result.is_active = is_active_(rule.source);
     result.parts = parts_of(rule);
+    for (Part& part : result.parts) put_winner_first(part.causes);
     const bool may_hold = std::any_of(result.parts.begin(), result.parts.end(),
                                       [](const Part& part) { return part.causes.empty(); });
     result.holds = result.is_active && may_hold;
@@ -168,7 +187,7 @@ class PortInquiry {
     cause.where = where;
     cause.of = of;
     if (kind == Cause::Kind::kConditionFalse) cause.condition = to_string(*written);
-    cause.because = sufficient_reason(*left, is_active_);
+    cause.because = sufficient_reason(*left, is_active_, winner_);
     const IsActive without_own = [this](const std::string& source) {
       return source != *own_ && is_active_(source);
     };
@@ -209,7 +228,10 @@ class PortInquiry {
     if (is_own_a_voice) {
       note_own_activity(cause);
     } else {
-      const Voice& first = voices.active.front();
+      const auto winner = std::find_if(
+          voices.active.begin(), voices.active.end(),
+          [this](const Voice& voice) { return winner_ != nullptr && *voice.source == *winner_; });
+      const Voice& first = winner == voices.active.end() ? voices.active.front() : *winner;
       if (first.behaviour != inhibitor) {
         cause.speaker = element(rules_.provenance->model.behaviours[first.behaviour]);
       }
@@ -287,7 +309,8 @@ class PortInquiry {
   std::unordered_map<std::string, const Select*> selects_;             // by source
   std::unordered_map<std::size_t, Voices> voices_;                     // by behaviour
   std::optional<std::set<std::string>> read_;                          // by any rule
-  const std::string* own_ = nullptr;  // source of the connection whose parts are looked at
+  const std::string* winner_ = nullptr;  // the source that wins, if one does
+  const std::string* own_ = nullptr;     // source of the connection whose parts are looked at
   bool is_own_active_ = false;
 };
 

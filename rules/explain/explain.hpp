@@ -56,7 +56,9 @@ struct Cause {
 struct Part {
   std::optional<Element> behaviour;  // none: written by hand
   Location where;                    // of the <config> or <select>
-  std::vector<Cause> causes;         // none: it holds, or would if the source were active
+  // None: it holds, or would if the source were active. Those that the winner alone makes so, or
+  // has a part in, stand in front.
+  std::vector<Cause> causes;
 };
 
 struct ConnectionExplanation {

@@ -25,6 +25,8 @@ void collect_sources(const Expression& expression, std::unordered_set<const Expr
   for (const auto& operand : expression.operands) collect_sources(*operand, seen, sources);
 }
 
+constexpr std::size_t kNoPlace = static_cast<std::size_t>(-1);
+
 // A reason found along the expression: of what is decided by one operand the one with the smallest
 // reason, of what takes all operands all of theirs.
 class StructuralReason {
@@ -32,8 +34,9 @@ class StructuralReason {
   // Places of literals in a list, ascending.
   using Places = std::vector<std::uint32_t>;
 
-  explicit StructuralReason(const std::vector<Literal>& literals)
-      : literals_(literals), evaluation_([this](const std::string& source) {
+  // `preferred`: a place, or kNoPlace.
+  explicit StructuralReason(const std::vector<Literal>& literals, std::size_t preferred = kNoPlace)
+      : literals_(literals), preferred_(preferred), evaluation_([this](const std::string& source) {
           return truth(literals_[place_of(source)].active);
         }) {}
 
@@ -94,11 +97,15 @@ class StructuralReason {
       for (const auto& operand : operands) {
         if (is_literal(*operand) != literals || value(*operand) != wanted) continue;
         const Places& found = of(*operand);
-        if (smallest == nullptr || found.size() < smallest->size()) smallest = &found;
+        if (smallest == nullptr || rank_of(found) < rank_of(*smallest)) smallest = &found;
       }
       if (smallest != nullptr) return *smallest;
     }
     return {};
+  }
+
+  [[nodiscard]] std::pair<std::size_t, bool> rank_of(const Places& places) const {
+    return {places.size(), !std::binary_search(places.begin(), places.end(), preferred_)};
   }
 
   static bool is_literal(const Expression& expression) {
@@ -114,6 +121,7 @@ class StructuralReason {
   }
 
   const std::vector<Literal>& literals_;
+  const std::size_t preferred_;
   Evaluation evaluation_;
   std::unordered_map<const Expression*, Places> known_;  // its values stay where they are
 };
@@ -218,7 +226,7 @@ class Tabulation {
 
 // Tries all sets of literals, the small ones first.
 std::vector<Literal> smallest_reason(const Expression& expression,
-                                     const std::vector<Literal>& literals) {
+                                     const std::vector<Literal>& literals, std::size_t preferred) {
   const bool value = StructuralReason(literals).value(expression);
   Tabulation tabulation(literals);
   TruthTable otherwise = tabulation.of(expression);
@@ -230,9 +238,12 @@ std::vector<Literal> smallest_reason(const Expression& expression,
   }
   std::vector<unsigned> choices(std::size_t{1} << literals.size());
   for (unsigned i = 0; i < choices.size(); ++i) choices[i] = i;
-  std::stable_sort(choices.begin(), choices.end(), [](unsigned left, unsigned right) {
-    return std::popcount(left) < std::popcount(right);
-  });
+  const auto rank_of = [&](unsigned choice) {
+    const bool has_preferred = preferred != kNoPlace && (choice >> preferred & 1) != 0;
+    return std::pair(std::popcount(choice), !has_preferred);
+  };
+  std::stable_sort(choices.begin(), choices.end(),
+                   [&](unsigned left, unsigned right) { return rank_of(left) < rank_of(right); });
   for (const unsigned choice : choices) {
     TruthTable left_over = otherwise;
     std::vector<Literal> chosen;
@@ -265,9 +276,9 @@ std::vector<Literal> lean_reason(const Expression& expression, bool value,
 }
 
 std::vector<Literal> large_reason(const Expression& expression,
-                                  const std::vector<Literal>& literals) {
+                                  const std::vector<Literal>& literals, std::size_t preferred) {
   constexpr std::size_t kMaxLean = 32;  // it takes an evaluation for each
-  StructuralReason search(literals);
+  StructuralReason search(literals, preferred);
   std::vector<Literal> result;
   for (const std::uint32_t place : search.of(expression)) result.push_back(literals[place]);
   if (result.size() > kMaxLean) return result;
@@ -276,15 +287,21 @@ std::vector<Literal> large_reason(const Expression& expression,
 
 }  // namespace
 
-std::vector<Literal> sufficient_reason(const Expression& expression, const IsActive& is_active) {
+std::vector<Literal> sufficient_reason(const Expression& expression, const IsActive& is_active,
+                                       const std::string* preferred) {
   std::unordered_set<const Expression*> seen;
   std::set<std::string> sources;
   collect_sources(expression, seen, sources);
   std::vector<Literal> literals;
   literals.reserve(sources.size());
-  for (const std::string& source : sources) literals.push_back({source, is_active(source)});
-  return literals.size() <= kMaxSourcesForSmallest ? smallest_reason(expression, literals)
-                                                   : large_reason(expression, literals);
+  std::size_t preferred_at = kNoPlace;
+  for (const std::string& source : sources) {
+    if (preferred != nullptr && source == *preferred) preferred_at = literals.size();
+    literals.push_back({source, is_active(source)});
+  }
+  return literals.size() <= kMaxSourcesForSmallest
+             ? smallest_reason(expression, literals, preferred_at)
+             : large_reason(expression, literals, preferred_at);
 }
 
 }  // namespace arbiter::rules

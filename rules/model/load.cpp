@@ -17,6 +17,7 @@
 #include "rules/model/name_checks.hpp"
 #include "rules/model/provenance.hpp"
 #include "rules/text/defines.hpp"
+#include "rules/text/names.hpp"
 #include "rules/text/text_file.hpp"
 
 namespace arbiter::rules {
@@ -36,8 +37,8 @@ void add_application(const TextFile& file, LoadedModel& loaded, Diagnostics& dia
   if (read.is_incomplete) loaded.application->is_incomplete = true;
 }
 
-void read_all(const ModelTexts& texts, LoadedModel& loaded, Diagnostics& diagnostics) {
-  Defines defines;
+void read_all(const ModelTexts& texts, Defines& defines, LoadedModel& loaded,
+              Diagnostics& diagnostics) {
   std::set<std::string> read;
   for (const FileText& each : texts.models) {
     if (!read.insert(each.path).second) {
@@ -64,7 +65,8 @@ LoadedModel load_all(const ModelTexts& texts, Diagnostics& diagnostics,
 
   Diagnostics found;
   LoadedModel loaded;
-  read_all(texts, loaded, found);
+  Defines defines;
+  read_all(texts, defines, loaded, found);
   const std::optional<Application>& application = loaded.application;
   check_sources(loaded.model, found);
   Hierarchy hierarchy(loaded.model, found);
@@ -78,6 +80,7 @@ LoadedModel load_all(const ModelTexts& texts, Diagnostics& diagnostics,
     for (PortRules& port : rules.ports) port.is_doubtful = doubts.about(port.port);
     has_all_names = !doubts.everything && !may_lack_names(loaded.model, application);
   } else {
+    defines.note_unused(found);
     note_commands_forever(loaded.model, rules, whole, found);
     if (application) note_unarbitrated(*application, rules, found);
   }
@@ -99,6 +102,9 @@ ModelTexts read_texts(const ModelFiles& files, Accept accept) {
       return {path, read_bytes(path, kMaxFileBytes, accept)};
     } catch (const FileError& error) {
       problems += (problems.empty() ? "" : "; ") + std::string(error.what());
+      if (const auto parts = files_in(path); !parts.empty()) {
+        problems += "; " + enumerate(parts) + " are files: give each of them by itself";
+      }
       return {};
     }
   };

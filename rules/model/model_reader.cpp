@@ -175,8 +175,12 @@ class ModelReader {
   }
 
   void announce_defines(const XmlNode* first) {
+    has_only_defines_ = true;
     for (const XmlNode& element : Elements(first)) {
-      if (element.text != "define") continue;
+      if (element.text != "define") {
+        has_only_defines_ = false;
+        continue;
+      }
       for (const XmlAttribute& attribute : element.attributes) {
         if (attribute.name == "name") {
           defines_.announce(collapse_blanks(attribute.value), reader_.where(element));
@@ -198,7 +202,8 @@ class ModelReader {
     // Trimmed, so that ${a}${b} can make one name.
     std::optional<std::string> value;
     if (text) value = std::string(trim(text->bytes()));
-    if (!defines_.add(name->name, std::move(value), name->where)) {
+    // A file of defines alone offers them to several models.
+    if (!defines_.add(name->name, std::move(value), name->where, has_only_defines_)) {
       reader_.error("duplicate-define", name->where,
                     "the define " + quote(name->name) + " exists already, at " +
                         describe(*defines_.find(name->name)) + "; rename or remove one");
@@ -290,6 +295,7 @@ class ModelReader {
   Diagnostics& diagnostics_;
   ElementReader reader_;
   bool is_in_root_ = false;
+  bool has_only_defines_ = false;
 };
 
 }  // namespace

@@ -8,9 +8,9 @@
 
 namespace arbiter::rules {
 
-bool Defines::add(const std::string& name, std::optional<std::string> value,
-                  const Location& where) {
-  return defines_.emplace(name, Define{std::move(value), where}).second;
+bool Defines::add(const std::string& name, std::optional<std::string> value, const Location& where,
+                  bool is_offered) {
+  return defines_.emplace(name, Define{std::move(value), where, is_offered}).second;
 }
 
 const Location* Defines::find(const std::string& name) const {
@@ -56,9 +56,10 @@ std::optional<Text> Defines::expand(const Text& text, Diagnostics& diagnostics) 
 }
 
 const std::string* Defines::look_up(const std::string& name, const Text& text, std::size_t at,
-                                    Diagnostics& diagnostics) const {
+                                    Diagnostics& diagnostics) {
   const auto found = defines_.find(name);
   if (found != defines_.end()) {
+    found->second.is_used = true;
     return found->second.value ? &*found->second.value : nullptr;
   }
   if (expects_gaps_) return nullptr;
@@ -82,6 +83,16 @@ const std::string* Defines::look_up(const std::string& name, const Text& text, s
                     "no define has the name " + quote(name) +
                         advise(name, known, "write <define name=\"…\"> for it further up"));
   return nullptr;
+}
+
+void Defines::note_unused(Diagnostics& diagnostics) const {
+  for (const auto& [name, define] : defines_) {
+    if (define.is_used) continue;
+    diagnostics.note("unused-define", define.where,
+                     "nothing uses the define " + quote(name) +
+                         ": what it says counts nowhere; write ${" + name +
+                         "} where it is to count, or remove it");
+  }
 }
 
 // The account is never given back; a model of this size is refused as a whole.

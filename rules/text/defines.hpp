@@ -20,8 +20,10 @@ inline constexpr std::size_t kMaxExpandedBytesInAll = 64u << 20;
 class Defines {
  public:
   // False where the name is taken; then the first define stands. A define without a value is one
-  // that could not be read: it keeps its uses from being reported as well.
-  bool add(const std::string& name, std::optional<std::string> value, const Location& where);
+  // that could not be read: it keeps its uses from being reported as well. `is_offered`: nobody
+  // need use it.
+  bool add(const std::string& name, std::optional<std::string> value, const Location& where,
+           bool is_offered = false);
   [[nodiscard]] const Location* find(const std::string& name) const;
 
   // Tells of a define further down in the file that is being read, so that a use before it is
@@ -34,14 +36,19 @@ class Defines {
   // Empty where something is wrong, which was then reported.
   std::optional<Text> expand(const Text& text, Diagnostics& diagnostics);
 
+  // Notes "unused-define". To be asked behind the last text: no text may have been refused, since
+  // it may have had the use.
+  void note_unused(Diagnostics& diagnostics) const;
+
  private:
   struct Define {
     std::optional<std::string> value;
     Location where;
+    bool is_used = false;  // or need not be
   };
   // The define that a use names, or nothing, reported.
   const std::string* look_up(const std::string& name, const Text& text, std::size_t at,
-                             Diagnostics& diagnostics) const;
+                             Diagnostics& diagnostics);
   bool take_account_of(std::size_t bytes, const Text& text, std::size_t at,
                        Diagnostics& diagnostics);
 

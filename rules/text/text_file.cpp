@@ -126,6 +126,19 @@ std::string read_bytes(const std::string& path, std::size_t limit, Accept accept
   return content;
 }
 
+std::vector<std::string> files_in(const std::string& list) {
+  struct stat status {};
+  if (list.find(',') == std::string::npos || ::stat(list.c_str(), &status) == 0) return {};
+  std::vector<std::string> files;
+  for (std::size_t begin = 0; begin <= list.size();) {
+    const std::size_t comma = std::min(list.find(',', begin), list.size());
+    files.push_back(list.substr(begin, comma - begin));
+    if (::stat(files.back().c_str(), &status) != 0) return {};
+    begin = comma + 1;
+  }
+  return files;
+}
+
 bool check_size(const TextFile& file, std::size_t limit, Diagnostics& diagnostics) {
   if (file.content().size() <= limit) return true;
   diagnostics.error("limit-exceeded", file.locate(0),

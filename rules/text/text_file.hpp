@@ -53,6 +53,10 @@ enum class Accept { kAnyFile, kRegularFile };
 std::string read_bytes(const std::string& path, std::size_t limit = kMaxFileBytes,
                        Accept accept = Accept::kAnyFile);
 
+// "a.xml,b.xml" in place of a file: its parts, where each of them is a file and the whole is none;
+// otherwise nothing.
+std::vector<std::string> files_in(const std::string& list);
+
 // Reports a file that is larger than the limit, and returns false.
 bool check_size(const TextFile& file, std::size_t limit, Diagnostics& diagnostics);
 

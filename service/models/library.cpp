@@ -31,6 +31,17 @@ void warn_if_all_may_write(const std::string& path, rules::Diagnostics& diagnost
                           path);
 }
 
+// Of several files in place of one: how they are given. Empty: there are none such.
+std::string advice_on_lists(const NamedFiles& model) {
+  std::string options;
+  for (const std::string& path : model.files.models) {
+    for (const std::string& file : rules::files_in(path)) {
+      options += " --model " + (model.name == kDefaultModel ? "" : model.name + '=') + file;
+    }
+  }
+  return options.empty() ? "" : "; write:" + options;
+}
+
 }  // namespace
 
 std::size_t size_of(const Model& model) {
@@ -69,7 +80,7 @@ std::vector<ModelPointer> read_models(const std::vector<NamedFiles>& named, cons
           rules::load(rules::read_texts(each.files, rules::Accept::kRegularFile), diagnostics);
       model->compiled = rules::compile(rules, diagnostics, budget);
     } catch (const rules::FileError& error) {
-      findings.add_failure(error.what());
+      findings.add_failure(error.what() + advice_on_lists(each));
     }
     findings.add(named.size() == 1 ? "the model" : "the model " + each.name,
                  std::move(diagnostics));

@@ -1,7 +1,9 @@
 #include "service/policy/unmatched.hpp"
 
 #include <algorithm>
+#include <optional>
 #include <string>
+#include <utility>
 
 #include "rules/model/quantifiers.hpp"
 #include "rules/text/names.hpp"
@@ -39,6 +41,42 @@ bool fits_one(std::string_view glob, const Names& names, std::size_t& steps) {
   return false;
 }
 
+// Of a pattern with '*': the one that was probably meant, where what stands before the first '*'
+// resembles the beginning of some names; and fits one, if it goes on in the same way. In whole
+// parts of names: "/Operator/*" for "/Opertor/*".
+std::optional<std::string> find_meant(std::string_view glob, const Names& names,
+                                      std::size_t& steps) {
+  std::string_view beginning = glob.substr(0, glob.find('*'));
+  if (beginning.ends_with('/')) beginning.remove_suffix(1);
+  const auto parts = std::count(beginning.begin(), beginning.end(), '/');
+  Names known;
+  for (const std::string_view name : names) {
+    std::size_t end = 0;
+    for (auto i = parts; i > 0 && end != name.npos; --i) end = name.find('/', end + 1);
+    if (end == name.npos) continue;
+    const std::string_view part = name.substr(0, end);
+    if (known.empty() || known.back() != part) known.push_back(part);
+  }
+  const auto similar = rules::find_similar(beginning, known);
+  if (!similar || *similar == beginning) return std::nullopt;
+  std::string meant = *similar + std::string(glob.substr(beginning.size()));
+  const bool fits = steps > 0 && fits_one(meant, names, steps) && steps > 0;
+  return fits ? std::optional(std::move(meant)) : std::nullopt;
+}
+
+// What to do about a pattern that fits none of the names. `suggestions`: how many were looked for.
+std::string advice_on_pattern(std::string_view glob, const Names& names, std::size_t& suggestions,
+                              std::size_t& steps) {
+  constexpr std::string_view kOtherwise =
+      "correct it, unless components open such a port that no model needs";
+  const bool may_suggest = ++suggestions <= rules::kMaxSuggestions;
+  if (glob.find('*') == glob.npos) {
+    return rules::advise(glob, may_suggest ? names : Names{}, kOtherwise);
+  }
+  const auto meant = may_suggest ? find_meant(glob, names, steps) : std::nullopt;
+  return meant ? "; did you mean " + rules::quote(*meant) + "?" : "; " + std::string(kOtherwise);
+}
+
 }  // namespace
 
 void find_unmatched(const Policy& policy, NamedPorts ports, rules::Diagnostics& diagnostics) {
@@ -57,12 +95,9 @@ void find_unmatched(const Policy& policy, NamedPorts ports, rules::Diagnostics& 
     const std::string kind = on_both                 ? "a port"
                              : pattern.is_on_outputs ? "an output port"
                                                      : "an input port";
-    const bool may_suggest =
-        pattern.glob.find('*') == std::string_view::npos && ++suggestions <= rules::kMaxSuggestions;
-    std::string message = "no model names " + kind + " that fits " + rules::quote(pattern.glob);
-    message += rules::advise(pattern.glob, may_suggest ? candidates : Names{},
-                             "correct it, unless components open such a port that no model needs");
-    diagnostics.note("no-such-port", *pattern.where, std::move(message));
+    diagnostics.note("no-such-port", *pattern.where,
+                     "no model names " + kind + " that fits " + rules::quote(pattern.glob) +
+                         advice_on_pattern(pattern.glob, candidates, suggestions, steps));
   }
 }
 

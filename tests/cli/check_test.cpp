@@ -264,6 +264,36 @@ TEST(Check, WhatAMappingFeedsIsDeclaredForItsT) {
 }
 
 // Whatever reading and checking may find, by the text of the program.
+TEST(Check, ADefineThatNothingUsesIsNotedAndNeverAWarning) {
+  TemporaryDirectory directory;
+  const auto model = directory.write(
+      "m.xml",
+      "<behaviors>\n  <define name='free'>not /bumper:o</define>\n  <behavior name='B'>"
+      "<config at='/p:i'>/s:o</config></behavior></behaviors>");
+  const auto noted = arbiter({"check", model, "--strict"});
+  EXPECT_EQ(noted.exit_code, 0);
+  EXPECT_THAT(noted.err, StartsWith(model + ":2:17: note: nothing uses the define \"free\""));
+  EXPECT_EQ(arbiter({"check", model, "--silence", "unused-define"}).err, "");
+}
+
+TEST(Check, WithHostsANegationIsShownInTheConditionThatHasIt) {
+  TemporaryDirectory directory;
+  const auto model = directory.write("m.xml",
+                                     "<behaviors>\n"
+                                     "<behavior name='Look'><config at='/Gaze:i'>/Eye:o</config>"
+                                     "</behavior>\n"
+                                     "<behavior name='Rest'><config at='/Arm:i'>/Rest:o</config>\n"
+                                     "  <condition>not /Eye:o</condition></behavior></behaviors>");
+  std::string modules;
+  for (const auto& [name, node] : std::vector<std::pair<std::string, std::string>>{
+           {"Arm", "a"}, {"Rest", "a"}, {"Eye", "b"}, {"Gaze", "b"}}) {
+    modules += "<module><name>" + name + "</name><node>" + node + "</node></module>";
+  }
+  const auto hosts = directory.write("h.xml", "<application>" + modules + "</application>");
+  EXPECT_THAT(arbiter({"check", model, "--hosts", hosts}).err,
+              HasSubstr(model + ":4:3: warning: /Eye:o is on b, and a rule at /Arm:i on a"));
+}
+
 TEST(Check, EachCodeOfAWarningOrANoteIsOnThePageAndCanBeSilenced) {
   TemporaryDirectory directory;
   const auto model = directory.write("m.xml", kTrackModel);

@@ -54,6 +54,22 @@ TEST(Program, SaysWhichArgumentItDoesNotKnowAndWhatWasMeant) {
               HasSubstr("arbiter pub has no place for \"one\" and \"two\""));
 }
 
+// Once for all of them, and not the option of `why` that is spelt nearly so.
+TEST(Program, SaysWhichVerbHasTheOptionThatThisOneLacks) {
+  const std::string said =
+      "arbiter why has no option \"--recording\"; it asks a running daemon; of what was recorded, "
+      "ask: arbiter simulate --recording FILE --why=PORT --at TIME\n"
+      "Run `arbiter why --help` for more information.\n";
+  EXPECT_EQ(arbiter({"why", "/p:i", "--recording", "inc.mcap", "--at", "3s"}).err, said);
+  EXPECT_EQ(arbiter({"--recording", "why", "/p:i"}).err, said);
+  EXPECT_THAT(arbiter({"why", "/p:i", "--at", "3s"}).err,
+              HasSubstr("no option \"--at\"; it asks a running daemon"));
+  EXPECT_THAT(arbiter({"why", "/p:i", "--at", "3s", "--folow"}).err,
+              HasSubstr("TIME\narbiter why has no option \"--folow\"; did you mean"));
+  EXPECT_THAT(arbiter({"why", "--help"}).out,
+              HasSubstr("Of a recording: arbiter simulate --recording FILE --why=PORT --at TIME"));
+}
+
 TEST(Program, ShowsWhatWasMeantByAWordOrAnExample) {
   const auto error = [](const std::vector<std::string>& arguments) {
     const auto result = arbiter(arguments);

@@ -180,6 +180,42 @@ TEST(AcrossHosts, WhatIsNegatedTwiceIsRequired) {
   EXPECT_THAT(checked.message("crosses-network"), HasSubstr("it is read at /Base:i on a"));
 }
 
+// Where the source has its own connection, nothing is negated.
+TEST(AcrossHosts, ANegationIsToldWhereItIsWritten) {
+  const auto place_in = [](const std::string& model) {
+    const auto checked =
+        check(model, module("Arm", "a") + module("Rest", "a") + module("Eye", "b"));
+    const Diagnostic* const found = checked.find("negated-across-hosts");
+    return found == nullptr
+               ? ""
+               : std::to_string(found->where.line) + ":" + std::to_string(found->where.column);
+  };
+  const std::string rest = "<behavior name='Rest'><config at='/Arm:i'>/Rest:o</config>";
+  EXPECT_EQ(place_in(kArm), "3:73") << "the name in the inhibition";
+  // A connection of its own, at another port, stands before.
+  const std::string gaze =
+      "\n<behavior name='Home'>"
+      "<config at='/Arm/home:i'>/Eye:o</config></behavior>\n";
+  EXPECT_EQ(place_in("<behaviors>" + gaze + rest +
+                     "\n  <condition>not /Eye:o</condition></behavior></behaviors>"),
+            "4:3");
+  EXPECT_EQ(place_in("<behaviors><define name='free'>not /Eye:o</define>" + gaze + rest +
+                     "\n<condition>true</condition>\n<condition>${free}</condition></behavior>"
+                     "</behaviors>"),
+            "5:1")
+      << "of two conditions, the one that has it";
+  EXPECT_EQ(
+      place_in("<behaviors>" + gaze + "<meta_behavior name='All'><behavior>Rest</behavior>\n" +
+               "<condition>none(/Eye*)</condition></meta_behavior>\n" + rest +
+               "</behavior></behaviors>"),
+      "4:1")
+      << "a quantifier, above the behaviour";
+  EXPECT_EQ(place_in("<behaviors><arbiter at='/Arm:i' conflict='first'>\n<select from='/Eye:o'/>\n"
+                     "<select from='/Rest:o'/></arbiter></behaviors>"),
+            "2:1")
+      << "the rule that is tried before";
+}
+
 TEST(AcrossHosts, AtAPortInOrderEachConnectionIsNegatedForThoseBehindIt) {
   const auto checked =
       check(R"(<arbiter at="/Base:i" conflict="first">

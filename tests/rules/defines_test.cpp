@@ -10,9 +10,11 @@
 namespace arbiter::rules {
 namespace {
 
+using testing::Contains;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
+using testing::Not;
 
 TEST(Defines, WorkInEveryTextAndAttribute) {
   const Loaded loaded = load_text(R"(<behaviors>
@@ -51,6 +53,43 @@ TEST(Defines, OfAnEarlierFileAreUsableInALaterOne) {
   EXPECT_THAT(load_texts({definition, use}).findings(), IsEmpty());
   EXPECT_THAT(load_texts({use, definition}).findings(true),
               ElementsAre("a.xml:1:32 error unknown-define"));
+}
+
+// What is forgotten may be what keeps a robot from moving.
+TEST(Defines, ThatNothingUsesAreNoted) {
+  const std::string behaviour =
+      "<behavior name='B'><config at='/p'>/s</config><condition>not /x</condition></behavior>";
+  const Loaded forgotten = load_text("<behaviors>\n<define name='free'>not /bumper</define>\n" +
+                                     behaviour + "</behaviors>");
+  EXPECT_THAT(forgotten.findings(), ElementsAre("2:15 note unused-define"));
+  EXPECT_THAT(forgotten.message(), HasSubstr("nothing uses the define \"free\""));
+  EXPECT_THAT(forgotten.message(), HasSubstr("; write ${free} where it is to count, or remove it"));
+  // One that another one uses is used.
+  EXPECT_THAT(load_text("<behaviors><define name='a'>/x</define>\n<define name='b'>${a}</define>" +
+                        behaviour + "</behaviors>")
+                  .findings(),
+              ElementsAre("2:15 note unused-define"));
+  EXPECT_THAT(load_text("<behaviors><define name='p'>/p</define><behavior name='B'>"
+                        "<config at='${p}'>/s</config></behavior></behaviors>")
+                  .findings(),
+              IsEmpty());
+  // The use may be in what was refused.
+  EXPECT_THAT(load_text("<behaviors><define name='free'>not /bumper</define><behavior name='B'>"
+                        "<config at='/p'>/s</config><condition>(${free}</condition></behavior>"
+                        "</behaviors>")
+                  .findings(),
+              Not(Contains(HasSubstr("unused-define"))));
+}
+
+// Not all models need all that is offered to them.
+TEST(Defines, OfAFileOfDefinesAloneNeedNotBeUsed) {
+  const std::string library = "<behaviors><define name='p'>/p</define><define name='q'>/q</define>";
+  const std::string use = "<behavior name='B'><config at='${p}'>/s</config></behavior>";
+  EXPECT_THAT(load_texts({library + "</behaviors>", use}).findings(), IsEmpty());
+  EXPECT_THAT(load_texts({use, library + "</behaviors>"}).findings(true),
+              ElementsAre("a.xml:1:32 error unknown-define"));
+  EXPECT_THAT(load_texts({library + "<source port='/s'/></behaviors>", use}).findings(true),
+              ElementsAre("a.xml:1:54 note unused-define"));
 }
 
 TEST(Defines, ADollarWithoutABraceIsADollar) {

@@ -67,13 +67,39 @@ TEST_F(Explained, AnInhibitionTellsByWhomThroughWhomAndWhere) {
   EXPECT_EQ(cause.kind, Cause::Kind::kInhibited);
   EXPECT_EQ(cause.inhibitor->name, "Alert");
   EXPECT_TRUE(cause.inhibitor->is_meta);
-  EXPECT_EQ(cause.speaker->name, "High");
+  EXPECT_EQ(cause.speaker->name, "Higher") << "of those that speak, the one that wins";
   EXPECT_EQ(cause.of->name, "Curious");
   EXPECT_TRUE(cause.of->is_meta);
   EXPECT_EQ(place(cause.where), "6:15");
   EXPECT_FALSE(cause.across_ports);
-  EXPECT_THAT(said(cause.because), ElementsAre("/high"));
-  EXPECT_THAT(cause.also, ElementsAre("/higher"));
+  EXPECT_THAT(said(cause.because), ElementsAre("/higher"));
+  EXPECT_THAT(cause.also, ElementsAre("/high"));
+}
+
+// Each of the two is enough to keep the plan out; what one sees is who commands.
+TEST_F(Explained, OfCausesThatAreEnoughTheWinnersStandsInFront) {
+  const std::string apart = R"(<behaviors>
+<behavior name="Plan"><config at="/p">/plan</config>
+  <condition>not /bumper</condition></behavior>
+<behavior name="Drive"><config at="/p">/operator</config><inhibition>Plan</inhibition></behavior>
+</behaviors>)";
+  const auto causes = connection(apart, "/plan", {"/plan", "/operator", "/bumper"}).parts[0].causes;
+  ASSERT_EQ(causes.size(), 2u);
+  EXPECT_EQ(causes[0].kind, Cause::Kind::kInhibited);
+  EXPECT_THAT(said(causes[0].because), ElementsAre("/operator"));
+  EXPECT_THAT(said(causes[1].because), ElementsAre("/bumper"));
+
+  const std::string together = R"(<behaviors>
+<behavior name="Plan"><config at="/p">/plan</config>
+  <condition>not /bumper and not /operator</condition></behavior>
+<behavior name="Drive"><config at="/p">/operator</config></behavior>
+</behaviors>)";
+  const std::set<std::string> all{"/plan", "/operator", "/bumper"};
+  EXPECT_THAT(said(only_cause(connection(together, "/plan", all)).because),
+              ElementsAre("/operator"));
+  EXPECT_THAT(said(*connection(together, "/plan", all).reason()), ElementsAre("/operator"));
+  EXPECT_THAT(said(only_cause(connection(together, "/plan", {"/plan", "/bumper"})).because),
+              ElementsAre("/bumper"));
 }
 
 TEST_F(Explained, AConditionTellsWhoseItIsAndTheSmallestReason) {

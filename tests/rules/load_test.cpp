@@ -33,6 +33,28 @@ TEST(Load, SeveralFilesFormOneModel) {
   EXPECT_THAT(loaded.rules.timeouts, SizeIs(1));
 }
 
+// As `diff` takes them.
+TEST(Load, FilesInOneWordAreToBeGivenOneByOne) {
+  const Folder folder;
+  const std::string a = folder.write("a.xml", "<behaviors/>");
+  const std::string b = folder.write("b.xml", "<behaviors/>");
+  const auto problem_of = [](const std::string& path) -> std::string {
+    try {
+      (void)read_texts({{path}, {}});
+    } catch (const FileError& error) {
+      return error.what();
+    }
+    return "";
+  };
+  EXPECT_EQ(problem_of(a + "," + b), "cannot open " + a + "," + b +
+                                         ": No such file or directory; " + a + " and " + b +
+                                         " are files: give each of them by itself");
+  for (const std::string& other : {a + ",", a + "," + b + "x", a + "x"}) {
+    EXPECT_EQ(problem_of(other), "cannot open " + other + ": No such file or directory");
+  }
+  EXPECT_EQ(problem_of(folder.write("c,d.xml", "<behaviors/>")), "");
+}
+
 TEST(Load, WhatSeveralFilesSayTwiceIsAnErrorThatNamesTheOtherPlace) {
   struct Case {
     std::string first, second, finding, other_place;

@@ -121,6 +121,27 @@ TEST(SufficientReason, OfHundredsOfSourcesIsFoundAtOnce) {
   EXPECT_EQ(reason_of(negation(any), {"/s17"}), (std::vector<Literal>{{"/s17", true}}));
 }
 
+TEST(SufficientReason, OfSeveralOfOneSizeHasThePreferredSource) {
+  const auto preferring = [](const ExpressionPtr& expression, const Active& active,
+                             const std::string& preferred) {
+    return rules::sufficient_reason(
+        *expression, [&](const std::string& source) { return active.contains(source); },
+        &preferred);
+  };
+  std::vector<ExpressionPtr> many;
+  for (int i = 10; i < 40; ++i) many.push_back(active("/s" + std::to_string(i)));
+  for (const auto& any : {any_of({active("/s10"), active("/s11"), active("/s12")}), any_of(many)}) {
+    const Active two{"/s10", "/s12"};
+    EXPECT_EQ(preferring(any, two, "/s10"), (std::vector<Literal>{{"/s10", true}}));
+    EXPECT_EQ(preferring(any, two, "/s12"), (std::vector<Literal>{{"/s12", true}}));
+    EXPECT_EQ(preferring(any, two, "/s11").size(), 1u) << "it is inactive, and no reason";
+    EXPECT_EQ(preferring(any, two, "/other").size(), 1u);
+  }
+  const auto either = any_of({all_of({active("/a"), active("/b")}), active("/c")});
+  EXPECT_EQ(preferring(either, {"/a", "/b", "/c"}, "/a"), (std::vector<Literal>{{"/c", true}}))
+      << "the smallest all the same";
+}
+
 TEST(SufficientReason, OfWhatIsAlwaysSoIsEmpty) {
   const auto never = all_of({active("/a"), inactive("/a")});
   EXPECT_TRUE(reason_of(never, {}).empty());

@@ -12,10 +12,13 @@
 namespace arbiter::service {
 namespace {
 
+using testing::AllOf;
+using testing::Each;
 using testing::ElementsAre;
 using testing::EndsWith;
 using testing::HasSubstr;
 using testing::IsEmpty;
+using testing::SizeIs;
 
 constexpr uid_t kOwner = 500, kAlice = 1000, kBob = 1001;
 constexpr gid_t kOperators = 2000, kGuests = 2001;
@@ -275,6 +278,16 @@ TEST(Policy, NotesAPatternThatFitsNoPortOfAModel) {
                   "components open such a port that no model needs",
                   "2:26: no model names a port that fits \"/L*:?\"; correct it, unless components "
                   "open such a port that no model needs"));
+  // Of a pattern, what stands before the first '*'.
+  const NamedPorts joystick{{"/Operator/cmd:o", "/Operator/deadman:o", "/Nav/vel:o"}, {}};
+  EXPECT_THAT(unmatched("allow user alice output /Opertor/* /operator*", joystick),
+              ElementsAre(EndsWith("\"/Opertor/*\"; did you mean \"/Operator/*\"?"),
+                          EndsWith("\"/operator*\"; did you mean \"/Operator*\"?")));
+  // It must fit then; and what stands behind the '*' may be wrong, too.
+  EXPECT_THAT(
+      unmatched("allow user alice output /Opertor/*:i /Operator/x* /Lidar/* /Operator/cnd*:o",
+                joystick),
+      AllOf(SizeIs(4), Each(EndsWith("open such a port that no model needs"))));
   // Each kind of port has names of its own.
   EXPECT_THAT(unmatched("allow user alice input /Gaze:o\nallow user alice replay /Gaze:i", ports),
               ElementsAre(HasSubstr("an input port that fits \"/Gaze:o\"; did you mean "

@@ -56,6 +56,29 @@ TEST(Start, IsRefusedForWarningsIfItIsStrict) {
   EXPECT_NE(log.find("--strict treats warnings as errors"), std::string::npos) << log;
 }
 
+TEST(Start, SaysHowSeveralFilesOfOneModelAreGiven) {
+  const TemporaryDirectory directory;
+  const auto cart = directory.write(
+      "cart.xml", "<behaviors><arbiter at='/in'><select from='/out'/></arbiter></behaviors>");
+  const auto lights = directory.write(
+      "lights.xml", "<behaviors><arbiter at='/light'><select from='/on'/></arbiter></behaviors>");
+  const auto both = cart + "," + lights;
+  const auto named = arbiterd({"--check", "--model", "work=" + both});
+  EXPECT_EQ(named.exit_code, 1);
+  EXPECT_NE(named.err.find("cannot open " + both + ": No such file or directory; "),
+            std::string::npos)
+      << named.err;
+  EXPECT_NE(named.err.find("; write: --model work=" + cart + " --model work=" + lights + "\n"),
+            std::string::npos)
+      << named.err;
+  const auto unnamed = arbiterd({"--check", "--model", both});
+  EXPECT_NE(unnamed.err.find("; write: --model " + cart + " --model " + lights + "\n"),
+            std::string::npos)
+      << unnamed.err;
+  const auto half = arbiterd({"--check", "--model", "work=" + cart + ",none"});
+  EXPECT_EQ(half.err.find("write:"), std::string::npos) << half.err;
+}
+
 // As a daemon would find them, but nobody is served.
 TEST(Start, ChecksItsFilesAndEndsIfThatIsAllItIsToDo) {
   const TemporaryDirectory directory;
