@@ -40,6 +40,8 @@ int echo_rate(const EchoOptions& options, const shm::FileDescriptor& interrupts)
 int echo_component(const EchoOptions& options, const shm::FileDescriptor& interrupts);
 
 shm::Nanoseconds end_of_echo(const EchoOptions& options, shm::Nanoseconds started);
+// Of the node that opens what echo watches. The daemon has answered just before: it is there.
+NodeOptions echo_node_options(const EchoOptions& options);
 // Calls look() when `fd` is readable, and ten times a second, until that returns false, the time is
 // over, or `interrupts` is readable.
 void echo_while(const EchoOptions& options, int fd, const shm::FileDescriptor& interrupts,

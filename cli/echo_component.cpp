@@ -20,10 +20,11 @@ constexpr std::uint32_t kDepth = 1024;
 
 class Echo {
  public:
-  Echo(const EchoOptions& options, const shm::FileDescriptor& interrupts)
+  Echo(const EchoOptions& options, EchoNews& news, const shm::FileDescriptor& interrupts)
       : options_(options),
+        news_(news),
         interrupts_(interrupts),
-        node_("arbiter-echo", live_options(options.instance)),
+        node_("arbiter-echo", echo_node_options(options)),
         in_(open(node_, options.port)),
         started_(shm::monotonic_now()) {}
 
@@ -88,7 +89,9 @@ class Echo {
   }
 
   [[nodiscard]] std::uint64_t overtaken() const try {
-    const auto status = fetch_status("echo-status", options_.instance);
+    watch::Instance* const instance = news_.instance();
+    if (instance == nullptr || !instance->has_daemon()) return 0;
+    const auto status = instance->status();
     const auto* input = status.find_input(options_.port);
     return input == nullptr || !input->open ? 0 : input->open->overtaken;
   } catch (const std::exception&) {
@@ -96,9 +99,9 @@ class Echo {
   }
 
   const EchoOptions& options_;
+  EchoNews& news_;
   const shm::FileDescriptor& interrupts_;
   EchoHosts hosts_{options_.instance};
-  EchoNews news_{options_.instance, options_.port};
   Node node_;
   InputPort<void> in_;
   const shm::Nanoseconds started_;
@@ -111,12 +114,13 @@ class Echo {
 namespace {
 
 // Opened as an input port, the name of an output port would be another port, which nobody feeds.
-void refuse_output_port(const EchoOptions& options) {
+void refuse_output_port(const EchoOptions& options, watch::Instance* instance) {
+  if (instance == nullptr) return;  // the policy does not let us ask
   wire::Status status;
   try {
-    status = fetch_status("echo", options.instance);
+    status = instance->status();
   } catch (const std::exception&) {
-    return;  // the policy does not let us ask; or opening the port will say what is wrong
+    return;  // opening the port will say what is wrong
   }
   const auto* source = status.find_source(options.port);
   if (source == nullptr || status.find_input(options.port) != nullptr) return;
@@ -129,8 +133,9 @@ void refuse_output_port(const EchoOptions& options) {
 }  // namespace
 
 int echo_component(const EchoOptions& options, const shm::FileDescriptor& interrupts) {
-  refuse_output_port(options);
-  return Echo(options, interrupts).run();
+  EchoNews news(options.instance, options.port, interrupts);
+  refuse_output_port(options, news.instance());
+  return Echo(options, news, interrupts).run();
 }
 
 }  // namespace arbiter::cli

@@ -3,9 +3,11 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <chrono>
 #include <iostream>
 
 #include "cli/echo.hpp"
+#include "cli/live.hpp"
 #include "shm/clock.hpp"
 
 namespace arbiter::cli {
@@ -18,6 +20,12 @@ constexpr shm::Nanoseconds kEchoLookInterval = 100'000'000;
 
 shm::Nanoseconds end_of_echo(const EchoOptions& options, shm::Nanoseconds started) {
   return options.duration == shm::kForever ? shm::kForever : started + options.duration;
+}
+
+NodeOptions echo_node_options(const EchoOptions& options) {
+  NodeOptions node = live_options(options.instance);
+  node.connect_timeout = std::chrono::seconds(5);
+  return node;
 }
 
 void echo_while(const EchoOptions& options, int fd, const shm::FileDescriptor& interrupts,

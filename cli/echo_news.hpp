@@ -7,6 +7,7 @@
 
 #include "cli/live.hpp"
 #include "shm/decision_memory.hpp"
+#include "shm/file_descriptor.hpp"
 #include "watch/instance.hpp"
 
 namespace arbiter::cli {
@@ -15,8 +16,9 @@ namespace arbiter::cli {
 // into force that does not mention the port. Silent where the policy does not let us observe.
 class EchoNews {
  public:
-  // Throws wire::CallError where no daemon answers.
-  EchoNews(const std::string& instance, std::string port);
+  // Waits some seconds for a daemon that is there and does not answer yet; less if it is
+  // interrupted. Throws wire::CallError where none answers.
+  EchoNews(const std::string& instance, std::string port, const shm::FileDescriptor& interrupts);
   // To be called several times a second. Asks the daemon for its names once for each model, for a
   // second at most.
   void tell();

@@ -100,7 +100,7 @@ class RateEcho {
         is_input_(of == TapOf::input),
         news_(news),
         interrupts_(interrupts),
-        node_("arbiter-echo", live_options(options.instance)),
+        node_("arbiter-echo", echo_node_options(options)),
         tap_(node_.tap(options.port, tap_options(of))) {}
 
   int run() {
@@ -183,7 +183,7 @@ class RateEcho {
 }  // namespace
 
 int echo_rate(const EchoOptions& options, const shm::FileDescriptor& interrupts) {
-  EchoNews news(options.instance, options.port);
+  EchoNews news(options.instance, options.port, interrupts);
   return RateEcho(options, kind_of_port(options, news.instance()), news, interrupts).run();
 }
 

@@ -65,7 +65,7 @@ class TapEcho {
         is_input_(of == TapOf::input),
         news_(news),
         interrupts_(interrupts),
-        node_("arbiter-echo", live_options(options.instance)),
+        node_("arbiter-echo", echo_node_options(options)),
         tap_(node_.tap(options.port, tap_options(of))),
         started_(shm::monotonic_now()) {}
 
@@ -262,7 +262,7 @@ TapOf kind_of_port(const EchoOptions& options, watch::Instance* instance) {
 }
 
 int echo_tap(const EchoOptions& options, const shm::FileDescriptor& interrupts) {
-  EchoNews news(options.instance, options.port);
+  EchoNews news(options.instance, options.port, interrupts);
   return TapEcho(options, kind_of_port(options, news.instance()), news, interrupts).run();
 }
 

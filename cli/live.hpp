@@ -54,6 +54,7 @@ class DaemonNews {
  private:
   const std::string goes_on_;
   bool is_alone_ = false;
+  std::uint64_t daemons_ = 0;
 };
 
 // How often a verb that follows decisions looks, beside the times at which it knows that an

@@ -35,10 +35,12 @@ class Follower {
     std::uint64_t changes = 0;
     while (std::cout && !has_reader_gone()) {
       const shm::Nanoseconds soon = shm::monotonic_now() + kLookEvery;
-      if (sleep_until(std::min(soon, last_.picture.next_end()), interrupts_)) return 0;
+      const shm::Nanoseconds end = is_model_unknown_ ? soon : last_.picture.next_end();
+      if (sleep_until(std::min(soon, end), interrupts_)) return 0;
       port_.instance().update();
       news_.tell(port_.instance());  // decisions do not depend on it
       Look look = port_.look();
+      if (look.generation() != last_.generation() && !take_up_model(look)) continue;
       if (look.winner != last_.winner || name_of(look) != name_of(last_)) {
         if (!write_change(look)) continue;
         if (++changes == options_.count) return 0;
@@ -81,6 +83,28 @@ class Follower {
 
   static void write_line(const json& line) {
     std::cout << line.dump(-1, ' ', false, json::error_handler_t::replace) << std::endl;
+  }
+
+  // Of another model: its names and its texts come from the daemon. False: it does not answer, and
+  // is asked again later.
+  bool take_up_model(Look& look) {
+    constexpr shm::Nanoseconds kAskForModelAgain = 2'000'000'000;
+    is_model_unknown_ = true;
+    if (!port_.instance().has_daemon() || shm::monotonic_now() < ask_again_) return false;
+    try {
+      port_.instance().catch_up();
+      port_.find_again();
+      look = port_.look();
+      is_model_unknown_ = !port_.explain(look);
+    } catch (const wire::RefusedError&) {
+      throw;
+    } catch (const wire::CallError&) {
+      ask_again_ = shm::monotonic_now() + kAskForModelAgain;
+      std::cerr
+          << "arbiter: the daemon does not tell of the model that has come into force; asking "
+             "it again until it does\n";
+    }
+    return !is_model_unknown_;
   }
 
   // False: another model has come into force meanwhile, and it must be looked at again.
@@ -135,6 +159,8 @@ class Follower {
   watch::Port port_;
   const shm::Nanoseconds started_;
   Look last_;
+  bool is_model_unknown_ = false;  // that is in force now
+  shm::Nanoseconds ask_again_ = 0;
   DaemonNews news_{"following"};
 };
 

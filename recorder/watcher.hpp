@@ -111,6 +111,7 @@ class Watcher {
   std::set<std::pair<std::string, std::int32_t>> strangers_;
   OpenPorts ports_{0};
   bool is_alone_ = false;
+  std::uint64_t daemons_ = 0;
   Nanoseconds last_ports_ = 0;
   std::vector<std::shared_ptr<TapReader>> opened_;  // and not handed over yet
 

@@ -204,8 +204,8 @@ std::optional<shm::SourceId> Instance::find_source(std::string_view name) const 
   return is_known ? std::optional(found->second) : std::nullopt;
 }
 
-wire::Received Instance::ask(const wire::Message& question, std::optional<milliseconds> limit) {
-  const auto give_up = Clock::now() + limit.value_or(caller_.answer_time);
+wire::Received Instance::ask(const wire::Message& question) {
+  const auto give_up = Clock::now() + caller_.answer_time;
   wire::Message numbered = question;
   numbered.request = ++last_request_;
   asked_ = numbered.request;
@@ -234,9 +234,7 @@ wire::Received Instance::ask(const wire::Message& question, std::optional<millis
   return answer;
 }
 
-void Instance::catch_up(std::optional<milliseconds> limit) {
-  static_cast<void>(ask(message_of(wire::MessageKind::kObserve), limit));
-}
+void Instance::catch_up() { static_cast<void>(ask(message_of(wire::MessageKind::kObserve))); }
 
 wire::Status Instance::status() {
   const wire::Received answer = ask(message_of(wire::MessageKind::kStatus));

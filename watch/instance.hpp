@@ -65,13 +65,11 @@ class Instance {
   [[nodiscard]] std::optional<shm::SourceId> find_source(std::string_view name) const;
 
   // The answer to a question that changes nothing; where the daemon goes meanwhile, that of the
-  // next. Throws wire::CallError where it refuses, or none answers within `limit`, which is the
-  // caller's answer_time if nothing is said.
-  wire::Received ask(const wire::Message& question,
-                     std::optional<std::chrono::milliseconds> limit = {});
+  // next. Throws wire::CallError where it refuses, or none answers within the caller's answer_time.
+  wire::Received ask(const wire::Message& question);
   // Returns when all pages and names have come that the daemon had when it was asked: those of the
   // model in force among them. Throws as ask().
-  void catch_up(std::optional<std::chrono::milliseconds> limit = {});
+  void catch_up();
   // Throws wire::CallError, wire::DocumentError.
   wire::Status status();
 

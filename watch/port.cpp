@@ -33,6 +33,8 @@ Port::Port(std::shared_ptr<Instance> instance, std::string name)
       name_(std::move(name)),
       id_(require_port(*instance_, name_)) {}
 
+void Port::find_again() { id_ = instance_->find_port(name_).value_or(id_); }
+
 void Port::require_memory() const {
   if (instance_->memory() != memory_) {
     throw WatchError("another daemon has started without the memory of the last one; ask again");

@@ -63,6 +63,11 @@ class Port {
   // Throws as Instance::ask(), and WatchError.
   std::optional<rules::PortExplanation> explain(const Look& look);
 
+  // To be called when another model has come into force, and the instance has caught up with it: a
+  // port that no model needed for a while, and nobody has open, has another id when it is needed
+  // again. Asks nobody.
+  void find_again();
+
   [[nodiscard]] Instance& instance() const { return *instance_; }
   [[nodiscard]] const std::string& name() const { return name_; }
   [[nodiscard]] shm::PortId id() const { return id_; }
@@ -89,7 +94,7 @@ class Port {
   const std::shared_ptr<Instance> instance_;
   const std::shared_ptr<const shm::DecisionMemory> memory_;
   const std::string name_;
-  const shm::PortId id_;
+  shm::PortId id_;
   std::optional<std::uint64_t> generation_;  // of what follows
   ModelInForce model_;
   rules::RuleSet rules_;

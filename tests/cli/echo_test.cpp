@@ -254,7 +254,9 @@ TEST(Echo, SaysWhatBecomesOfTheDaemonAndOfThePortInAnotherModel) {
       return content_of(path).find(text) != std::string::npos;
     };
     const bool is_component = way == std::string("--as-component");
-    await([&] { return is_component ? daemon.input("/p")["open"] == true : said("waiting"); });
+    await([&] {
+      return is_component ? daemon.input("/p")["open"] == true : said("no component has /p open");
+    });
     daemon.load("<behaviors><arbiter at='/q'><select from='/low'/></arbiter></behaviors>");
     await([&] { return said("which is in force now, does not mention /p\n"); });
     daemon.kill();
@@ -278,8 +280,9 @@ TEST(Echo, SaysSoOfADaemonThatDidNotAnswerAtFirst) {
   const auto said = [&](const char* text) {
     return content_of(path).find(text) != std::string::npos;
   };
-  await([&] { return said("waiting"); });  // by what it taps with, after it has asked in vain
+  await([&] { return said("waiting for the arbiterd"); });
   daemon.process().resume();
+  await([&] { return said("no component has /p open"); });  // it knows which model is in force
   daemon.load("<behaviors><arbiter at='/q'><select from='/low'/></arbiter></behaviors>");
   await([&] { return said("which is in force now, does not mention /p\n"); });
 }

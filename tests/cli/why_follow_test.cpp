@@ -181,5 +181,36 @@ TEST(WhyFollow, SaysThatTheDaemonHasGoneAndThatOneIsThereAgain) {
   EXPECT_EQ(followed.error_line(), "arbiter: a daemon is there again");
 }
 
+TEST(WhyFollow, WaitsForADaemonThatDoesNotTellOfAModel) {
+  Daemon daemon(kGazeModel);
+  Followed followed({"/gaze", "--follow"});
+  EXPECT_THAT(followed.line(), HasSubstr("  /gaze: idle"));
+  followed.process().stop();
+  daemon.load(kNoRules);
+  daemon.process().stop();
+  followed.process().resume();
+  EXPECT_THAT(followed.error_line(), HasSubstr("does not tell of the model that has come into "));
+  daemon.process().resume();
+  EXPECT_THAT(followed.line(), HasSubstr("  idle -> not mentioned  because model 2"));
+}
+
+// The daemon gives the names of ports back that no model of its history needs.
+TEST(WhyFollow, FollowsAPortThatHasAnotherIdSince) {
+  Daemon daemon(kGazeModel);
+  Node node("test");
+  auto random = node.output_port<int>("/random");
+  Followed followed({"/gaze", "--follow"});
+  EXPECT_THAT(followed.line(), HasSubstr("  /gaze: idle"));
+  for (int i = 0; i < 12; ++i) {
+    daemon.load("<behaviors><arbiter at='/q" + std::to_string(i) +
+                "'><select from='/random'/></arbiter></behaviors>");
+  }
+  EXPECT_THAT(followed.line(), HasSubstr("  idle -> not mentioned  because model "));
+  daemon.load(kGazeModel);
+  EXPECT_THAT(followed.line(), HasSubstr("  not mentioned -> idle  because model "));
+  random.signal();
+  EXPECT_THAT(followed.line(), HasSubstr("  idle -> /random  because "));
+}
+
 }  // namespace
 }  // namespace arbiter::test
