@@ -306,13 +306,15 @@ class PortFindings {
   }
 
   void index_inhibitions() {
+    VariableNumbers own;  // of this port; statements may be about others, too
     for (std::size_t x = 0; x < candidates_.size(); ++x) {
       const auto& rule = *candidates_[x].rule;
       place_of_[rule.source].set(x);
       for (const auto& read : rule.reads) readers_of_[read].set(x);
-      const auto implied = implied_literals(winners_->nodes(candidates_[x].wins));
-      for (std::size_t i = 0; i < winners_->sources().size(); ++i) {
-        if (implied.inactive[i]) inhibited_by_[winners_->sources()[i]].set(x);
+      const auto implied = implied_literals(own.number(winners_->nodes(candidates_[x].wins)));
+      for (std::size_t i = 0; i < own.variables().size(); ++i) {
+        const auto variable = static_cast<std::size_t>(own.variables()[i]);
+        if (implied.inactive[i]) inhibited_by_[winners_->sources()[variable]].set(x);
       }
     }
     for (const Candidate& each : candidates_)

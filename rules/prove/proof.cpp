@@ -34,6 +34,20 @@ bool exclude_each_other(const Literals& a, const Literals& b) {
   return (a.active & b.inactive).any() || (a.inactive & b.active).any();
 }
 
+DiagramNodes VariableNumbers::number(DiagramNodes function) {
+  for (auto& node : function.nodes) {
+    const auto variable = static_cast<std::size_t>(node.variable);
+    if (variable >= numbers_.size()) numbers_.resize(variable + 1, -1);
+    int& number = numbers_[variable];
+    if (number < 0) {
+      number = static_cast<int>(variables_.size());
+      variables_.push_back(node.variable);
+    }
+    node.variable = number;
+  }
+  return function;
+}
+
 Literals implied_literals(const DiagramNodes& function) {
   if (function.root >= kFalse) return {};
   return implied_by_each(function).front();

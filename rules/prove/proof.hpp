@@ -30,6 +30,20 @@ struct Literals {
 // All literals that the function implies; none if it is false, since it then implies everything.
 Literals implied_literals(const DiagramNodes& function);
 
+// Variables by numbers of their own, in the order in which they are met: functions over an order
+// that has more of them than a VariableSet may still be of few.
+class VariableNumbers {
+ public:
+  // The function with these in place of its variables.
+  DiagramNodes number(DiagramNodes function);
+  // By number.
+  [[nodiscard]] const std::vector<int>& variables() const { return variables_; }
+
+ private:
+  std::vector<int> numbers_;  // by variable; -1: none yet
+  std::vector<int> variables_;
+};
+
 // Whether one says of some variable the opposite of the other.
 bool exclude_each_other(const Literals& a, const Literals& b);
 

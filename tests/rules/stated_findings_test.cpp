@@ -10,8 +10,11 @@ namespace arbiter::test {
 namespace {
 
 using rules::Diagnostics;
+using testing::Contains;
 using testing::ElementsAre;
+using testing::HasSubstr;
 using testing::IsEmpty;
+using testing::UnorderedElementsAreArray;
 
 // The paper's arm: with object and collision both active nobody wins, on purpose. Nothing drives
 // the base while an object is there.
@@ -51,6 +54,33 @@ std::vector<std::string> found_beside(const std::string& text) {
 TEST(StatedFindings, WithoutStatementsAllIsNoted) {
   EXPECT_THAT(found_beside("/Rest or not /Rest"),
               ElementsAre("nobody-wins /Arm", "starved /Arm", "nobody-wins /Base"));
+}
+
+// More sources than a port may have.
+TEST(StatedFindings, AStatementAboutManySourcesOfSeveralPortsHidesNothing) {
+  RulesByHand by_hand;
+  for (const std::string port : {"/A", "/B"}) {
+    const auto source = [&](int number) { return port + "/" + std::to_string(number); };
+    std::vector<std::pair<std::string, ExpressionPtr>> rules;
+    for (int i = 0; i < 150; ++i) {
+      std::vector<ExpressionPtr> others;
+      for (int j = 0; j < 150; ++j) {
+        if (j != i) others.push_back(inactive(source(j)));
+      }
+      rules.emplace_back(source(i), all_of(std::move(others)));
+    }
+    by_hand.port(port, std::move(rules));
+  }
+  const auto found = [&](const std::string& statement) {
+    std::vector<std::string> result;
+    for (const auto& item : items_beside(by_hand, statement)) {
+      result.push_back(item.code + ' ' + item.message);
+    }
+    return result;
+  };
+  const auto beside_wide = found("winner(/A) = /A/0 and winner(/B) = /B/0 -> /A/0");
+  EXPECT_THAT(beside_wide, Contains(HasSubstr("inhibition-circle")).Times(2));
+  EXPECT_THAT(beside_wide, UnorderedElementsAreArray(found("/other or not /other")));
 }
 
 TEST(StatedFindings, AStateThatIsToBeIdleIsNotNoted) {
