@@ -1,5 +1,6 @@
 #include "cli/recording_times.hpp"
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdio>
 #include <ctime>
@@ -76,9 +77,11 @@ TimeSpan read_moment(const std::string& text, shm::Nanoseconds begin, shm::Nanos
     parts.tm_isdst = -1;
     std::tm day_after = parts;
     ++day_after.tm_mday;
-    shm::Nanoseconds wall = std::mktime(&parts) * kWholeSecond;
-    if (format[1] == 'H' && wall + kWholeSecond <= begin)
-      wall = std::mktime(&day_after) * kWholeSecond;
+    std::time_t second = std::mktime(&parts);
+    if (format[1] == 'H' && second + 1 <= begin / kWholeSecond) second = std::mktime(&day_after);
+    // No year is too far away to be counted in nanoseconds.
+    second = std::clamp(second, begin / kWholeSecond - 10, end / kWholeSecond + 10);
+    const shm::Nanoseconds wall = second * kWholeSecond;
     const bool is_whole_second = *rest == '\0';
     const TimeSpan span{wall + *fraction, wall + *fraction + (is_whole_second ? kWholeSecond : 1)};
     if (span.to <= begin || span.from > end) {

@@ -131,6 +131,7 @@ void Replayer::survey(const evidence::SourceState& state, Source& source) {
   const Nanoseconds time = shm::time_of(state.word, shm::kForever);
   if (time <= first_ || time > state.seen) return;
   source.has_events = true;
+  latest_ = std::max(latest_, time);
   untold_.push_back({state.context, time, state.seen, state.sequence, state.generation});
 }
 

@@ -159,6 +159,10 @@ TEST_F(RecordedSample, ThatIsNotThereIsRefusedWithTheReason) {
                  "00:00:07.000; choose one by --at");
   expect_refusal(sample("/again", {"--at", "00:00:02"}), "by then no sample of /again had come");
   expect_refusal(sample("/again", {"--at", "00:10:00"}), "is not in the recording");
+  for (const char* year : {"1600", "2554", "2611", "9999"}) {  // 2^64 ns are 584 years
+    expect_refusal(sample("/again", {"--at", std::string(year) + "-07-21 23:34:39"}),
+                   "is not in the recording");
+  }
   expect_refusal(sample("/again", {"--at", "00:00:06", "--sequence", "1"}), "excludes");
 }
 
