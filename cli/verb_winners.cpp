@@ -7,7 +7,9 @@
 #include <iostream>
 #include <map>
 #include <memory>
+#include <optional>
 #include <set>
+#include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
@@ -22,6 +24,7 @@
 #include "rules/model/quantifiers.hpp"
 #include "rules/text/names.hpp"
 #include "shm/clock.hpp"
+#include "shm/decision_memory.hpp"
 #include "shm/limits.hpp"
 #include "watch/winners.hpp"
 
@@ -42,33 +45,32 @@ void copy(char (&to)[Size], const std::string& from) {
   std::memcpy(to, from.data(), std::min(from.size(), Size - 1));
 }
 
-// How often ports that could not be opened are tried again.
+// How often ports that could not be opened are tried again; and where the daemon does not answer,
+// for each try holds the announcements up for a second.
 constexpr shm::Nanoseconds kOpenEvery = 1'000'000'000;
-
-// Nobody's rules need mention what is told of winners.
-NodeOptions announcer_options(const std::string& instance) {
-  NodeOptions options = live_options(instance);
-  options.on_notice = [say = options.on_notice](const Notice& notice) {
-    if (notice.kind != NoticeKind::unmentioned) say(notice);
-  };
-  return options;
-}
+constexpr shm::Nanoseconds kAskEvery = 5'000'000'000;
 
 class Announcer {
  public:
   Announcer(const WinnersOptions& options, shm::FileDescriptor interrupts)
       : options_(options),
         interrupts_(std::move(interrupts)),
-        node_("arbiter-winners", announcer_options(options.instance)),
+        node_(std::in_place, "arbiter-winners", node_options()),
         instance_(follow_instance("winners", options.instance)),
-        winners_(instance_, [this](std::string_view port) { return is_wanted(port); }) {}
+        memory_(instance_->memory()) {
+    follow_winners();
+  }
 
   int run() {
     shm::Nanoseconds repeat = shm::monotonic_now() + options_.every;
     for (;;) {
       instance_->update();
       news_.tell(*instance_);
-      const auto changes = winners_.look();
+      if (!belongs_to_daemon()) {
+        if (sleep_until(shm::monotonic_now() + kLookEvery, interrupts_)) return 0;
+        continue;
+      }
+      const auto changes = winners_->look();
       for (const watch::WinnerAt& change : changes) tell(change);
       warn_of_patterns_without_winners();
       if (!goes_on()) return 1;
@@ -81,7 +83,7 @@ class Announcer {
         repeat = now + options_.every;
         tell_again();
       }
-      const auto next = std::min({now + kLookEvery, std::max(winners_.next_end(), now), repeat});
+      const auto next = std::min({now + kLookEvery, std::max(winners_->next_end(), now), repeat});
       if (sleep_until(next, interrupts_)) return 0;
     }
   }
@@ -91,6 +93,68 @@ class Announcer {
     OutputPort<WinnerChange> out;
     WinnerChange last{};
   };
+
+  // Why a port could not be opened.
+  struct Problem {
+    std::string text;
+    bool is_silence = false;  // of the daemon
+  };
+
+  // Nobody's rules need mention what is told of winners. A daemon that does not answer is waited
+  // for aloud at the start only.
+  NodeOptions node_options() {
+    NodeOptions options = live_options(options_.instance);
+    options.on_notice = [say = options.on_notice](const Notice& notice) {
+      if (notice.kind != NoticeKind::unmentioned) say(notice);
+    };
+    options.on_waiting = [this, say = options.on_waiting](const std::string& text) {
+      has_waited_ = true;
+      if (!has_started_) say(text);
+    };
+    return options;
+  }
+
+  void follow_winners() {
+    winners_.emplace(instance_, [this](std::string_view port) { return is_wanted(port); });
+  }
+
+  // A daemon that has memory of its own does not take the node of the one before back: what it
+  // publishes reaches nobody. False: there is no node yet that belongs to it.
+  bool belongs_to_daemon() {
+    if (instance_->memory() == memory_) return true;
+    const bool is_first = node_.has_value();
+    if (is_first) {
+      std::cerr << "arbiter: a daemon has come that does not know what was before: announcing "
+                   "starts again\n";
+      ports_.clear();
+      waiting_.clear();
+      node_.reset();
+      open_again_ = 0;
+      has_said_why_not_ = false;
+    }
+    if (shm::monotonic_now() < open_again_ || !instance_->has_daemon()) return false;
+    try {
+      begin_again();
+      return true;
+    } catch (const std::runtime_error& error) {  // it is busy, has gone since, or refuses
+      node_.reset();
+      open_again_ = shm::monotonic_now() + kAskEvery;
+      if (!std::exchange(has_said_why_not_, true)) {
+        std::cerr << "arbiter: " << error.what() << "; trying again every 5 seconds\n";
+      }
+      return false;
+    }
+  }
+
+  // All names and pages come before the first look: who wins by then is no change.
+  void begin_again() {
+    const auto memory = instance_->memory();
+    node_.emplace("arbiter-winners", node_options());
+    instance_->catch_up();
+    follow_winners();
+    memory_ = memory;
+    open_again_ = shm::monotonic_now() + kOpenEvery;
+  }
 
   [[nodiscard]] bool is_wanted(std::string_view port) const {
     return std::any_of(options_.patterns.begin(), options_.patterns.end(),
@@ -118,20 +182,25 @@ class Announcer {
 
   void tell_again() {
     for (auto& [port, watched] : ports_) {
-      const auto now = winners_.now().find(port);
-      if (now == winners_.now().end()) continue;
+      const auto now = winners_->now().find(port);
+      if (now == winners_->now().end()) continue;
       watched.last.news = WinnerNews::unchanged;
-      watched.last.seen_ns = winners_.looked_at();
+      watched.last.seen_ns = winners_->looked_at();
       watched.last.generation = now->second.generation;
       watched.out.publish(watched.last);
     }
   }
 
-  // Opens it where it is new. Null: it cannot be opened.
+  // Opens it where it is new. Null: it cannot be opened, or not now.
   Watched* find(const std::string& port) {
     const auto found = ports_.find(port);
     if (found != ports_.end()) return &found->second;
-    return waiting_.count(port) != 0 ? nullptr : open(port);
+    if (waiting_.count(port) != 0) return nullptr;
+    if (is_silent_ && shm::monotonic_now() < open_again_) {
+      waiting_[port] = false;
+      return nullptr;
+    }
+    return open(port);
   }
 
   Watched* open(const std::string& port) {
@@ -144,26 +213,40 @@ class Announcer {
       }
       return nullptr;
     }
+    has_waited_ = is_silent_ = false;
     try {
-      Watched watched{node_.output_port<WinnerChange>(source)};
+      Watched watched{node_->output_port<WinnerChange>(source)};
       std::cerr << "arbiter: announcing " << port << " as " << source << '\n';
       waiting_.erase(port);
       return &ports_.emplace(port, std::move(watched)).first->second;
     } catch (const Error& error) {
-      if (waiting_.insert(port).second) problems_.emplace_back(error.what());
+      note_problem(port, error.what());
       return nullptr;
+    }
+  }
+
+  // Of a silent daemon it is said where a port is new; of what another has, once it is known.
+  void note_problem(const std::string& port, const char* why) {
+    const auto [waiting, is_new] = waiting_.try_emplace(port, false);
+    is_silent_ = has_waited_;
+    if (is_silent_) {
+      open_again_ = shm::monotonic_now() + kAskEvery;
+      if (is_new) problems_.push_back({why, true});
+    } else if (!std::exchange(waiting->second, true)) {
+      problems_.push_back({why, false});
     }
   }
 
   // What could not be opened in the last look, said once. False: there is nothing to go on for,
   // for at the start nothing could be opened.
   bool goes_on() {
-    const bool is_start = !has_started_ && !winners_.now().empty();
+    const bool is_start = !has_started_ && !winners_->now().empty();
     const bool may_go_on = !is_start || !ports_.empty() || waiting_.empty();
     has_started_ = has_started_ || is_start;
-    for (const std::string& problem : std::exchange(problems_, {})) {
-      std::cerr << "arbiter: " << problem << (may_go_on ? "; trying again every second" : "")
-                << '\n';
+    for (const Problem& problem : std::exchange(problems_, {})) {
+      const char* const again =
+          problem.is_silence ? "; trying again every 5 seconds" : "; trying again every second";
+      std::cerr << "arbiter: " << problem.text << (may_go_on ? again : "") << '\n';
     }
     return may_go_on;
   }
@@ -181,27 +264,35 @@ class Announcer {
     }
   }
 
-  // Somebody else may have had them, or the policy may have changed since.
+  // Somebody else may have had them, or the policy may have changed since. Where the daemon does
+  // not answer for one, it does not for the others.
   void open_waiting() {
     const auto waiting = waiting_;
-    for (const std::string& port : waiting) {
-      const auto now = winners_.now().find(port);
-      if (now != winners_.now().end() && open(port) != nullptr) tell(now->second);
+    for (const auto& [port, is_said] : waiting) {
+      const auto now = winners_->now().find(port);
+      if (now == winners_->now().end()) continue;
+      if (open(port) != nullptr) tell(now->second);
+      if (is_silent_) return;
     }
   }
 
   const WinnersOptions& options_;
   const shm::FileDescriptor interrupts_;
-  Node node_;
+  bool has_started_ = false;
+  bool has_waited_ = false;  // for the daemon, while the last port was opened
+  bool is_silent_ = false;   // the daemon: it has not answered for the last port
+  std::optional<Node> node_;
   const std::shared_ptr<watch::Instance> instance_;
-  watch::Winners winners_;
+  std::shared_ptr<const shm::DecisionMemory> memory_;  // that node_ and ports_ belong to
+  std::optional<watch::Winners> winners_;
   std::map<std::string, Watched> ports_;
   std::set<std::string> too_long_;
-  std::set<std::string> waiting_;      // input ports whose output port could not be opened
-  std::vector<std::string> problems_;  // why, of the last look
+  // Input ports whose output port could not be opened; true: it has been said why.
+  std::map<std::string, bool> waiting_;
+  std::vector<Problem> problems_;  // why, of the last look
   shm::Nanoseconds open_again_ = shm::monotonic_now() + kOpenEvery;
-  bool has_started_ = false;
-  ModelNews models_;  // that it has been warned of
+  bool has_said_why_not_ = false;  // that the daemon that has come last does not let it begin again
+  ModelNews models_;               // that it has been warned of
   DaemonNews news_{"announcing"};
 };
 

@@ -6,6 +6,7 @@
 #include <chrono>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include <arbiter/arbiter.hpp>
 
@@ -154,6 +155,63 @@ TEST_F(Winners, AreAnnouncedWhereOnePortCannotBeOpened) {
   EXPECT_EQ(err.find("trying again"), err.rfind("trying again")) << err;
   EXPECT_EQ(err.find("does not mention"), std::string::npos)
       << "nobody need mention these: " << err;
+  program_.signal(SIGINT);
+  EXPECT_EQ(program_.wait(), 0);
+}
+
+TEST_F(Winners, AreNotHeldUpByPortsThatAStoppedDaemonDoesNotOpen) {
+  std::string model = R"(<behaviors timeout="forever">)";
+  std::vector<OutputPort<int>> held;
+  for (const std::string arm : {"/arm1", "/arm2", "/arm3"}) {
+    model += "<behavior name=\"" + arm.substr(1) + "\"><config at=\"" + arm +
+             "\">/random</config></behavior>";
+    held.push_back(node_.output_port<int>("/arbiter/winner" + arm + ":o"));
+  }
+  daemon_.load(model + kBehaviours);
+  start();
+  repetition();
+  await([&] { return content_of(err_path()).find("/arm3:o") != std::string::npos; });
+  daemon_.process().signal(SIGSTOP);
+  // The ports are tried again meanwhile.
+  const auto stopped = repetition().seen_ns;
+  while (repetition().seen_ns < stopped + 3'000'000'000) {
+  }
+  EXPECT_EQ(content_of(err_path()).find("waiting for"), std::string::npos);
+  EXPECT_EQ(content_of(err_path()).find("5 seconds"), std::string::npos);
+  face_.signal();
+  EXPECT_STREQ(next().winner, "/face");
+  daemon_.process().signal(SIGCONT);
+  held.clear();
+  await([&] { return content_of(err_path()).find("announcing /arm3 as") != std::string::npos; });
+  program_.signal(SIGINT);
+  EXPECT_EQ(program_.wait(), 0);
+}
+
+TEST_F(Winners, AreAnnouncedAnewBehindADaemonThatDoesNotKnowThem) {
+  start();
+  repetition();
+  daemon_.kill();
+  daemon_.lose_state();
+  program_.signal(SIGSTOP);  // so that there is a winner by the time that it looks
+  daemon_.restart();
+  Node node("again");
+  auto face = node.output_port<int>("/face");
+  auto arm = node.input_port<int>("/gaze:i");
+  face.signal();
+  in_ = node.input_port<WinnerChange>("/news", {.depth = 1024});
+  program_.signal(SIGCONT);
+  WinnerChange seen = next();
+  EXPECT_EQ(seen.news, WinnerNews::start) << "who won before is no change";
+  EXPECT_STREQ(seen.winner, "/face");
+  EXPECT_EQ(seen.changes, 0U);
+  face.deactivate();
+  seen = next();
+  EXPECT_EQ(seen.news, WinnerNews::change);
+  EXPECT_STREQ(seen.before, "/face");
+  const std::string err = content_of(err_path());
+  const auto said = err.find("does not know what was before: announcing starts again\n");
+  EXPECT_NE(said, std::string::npos) << err;
+  EXPECT_EQ(said, err.rfind("does not know what was before")) << err;
   program_.signal(SIGINT);
   EXPECT_EQ(program_.wait(), 0);
 }
