@@ -28,6 +28,8 @@ using nlohmann::json;
 
 constexpr shm::Nanoseconds kFollowPeriod = 100'000'000;
 constexpr shm::Nanoseconds kHostsPeriod = 1'000'000'000;
+// Behind a question that was not answered: nothing is drawn while it waits.
+constexpr shm::Nanoseconds kHostsPause = 5'000'000'000;
 // Where models change faster than they can be drawn.
 constexpr int kMostLoads = 5;
 
@@ -105,7 +107,10 @@ class LivePicture {
     static_cast<void>(inquirer_.ask());
   }
   // What is to be drawn again and again must not wait for other hosts.
-  void begin_to_follow() { inquirer_.begin(); }
+  void begin_to_follow() {
+    inquirer_.begin();
+    follows_ = true;
+  }
 
   // False: the model cannot be drawn.
   bool update() {
@@ -166,14 +171,24 @@ class LivePicture {
   }
 
   // Which hosts sources come from, where no link says so: the daemon is asked once a second, and
-  // what was known stays.
+  // what was known stays, also where it does not answer.
   void look_at_hosts() {
     if (!instance_.has_daemon() || shm::monotonic_now() < ask_again_) return;
-    ask_again_ = shm::monotonic_now() + kHostsPeriod;
-    hosts_.clear();
-    for (const wire::SourceStatus& source : instance_.status().sources) {
-      const std::string host = watch::host_of(source);
-      if (!host.empty()) hosts_[source.name] = host;
+    try {
+      std::map<std::string, std::string> hosts;
+      for (const wire::SourceStatus& source : instance_.status().sources) {
+        const std::string host = watch::host_of(source);
+        if (!host.empty()) hosts[source.name] = host;
+      }
+      hosts_ = std::move(hosts);
+      has_answered_ = true;
+      ask_again_ = shm::monotonic_now() + kHostsPeriod;
+    } catch (const wire::CallError& error) {
+      if (!follows_) throw;
+      ask_again_ = shm::monotonic_now() + kHostsPause;
+      if (!instance_.has_daemon() || !std::exchange(has_answered_, false)) return;
+      std::cerr << "arbiter: " << error.what() << "; " << options_.output
+                << " follows all the same, with the hosts that were known last\n";
     }
   }
 
@@ -199,6 +214,8 @@ class LivePicture {
   std::map<std::string, std::string> ages_;  // as they were when that came
   std::map<std::string, std::string> hosts_;
   shm::Nanoseconds ask_again_ = 0;
+  bool has_answered_ = true;  // the last time
+  bool follows_ = false;
   bool fits_ = false;
   bool is_same_ = true;  // as far as it is known: given is what is in force
   bool warned_ = false;

@@ -122,7 +122,8 @@ struct Accepted {
   std::string port;
   std::string source;
   shm::Nanoseconds at = 0;
-  bool is_sample = true;  // else a signal, which no queue has
+  bool is_sample = true;         // else a signal, which no queue has
+  std::uint64_t generation = 0;  // of the model that accepted it
 };
 
 // A change of the winner.

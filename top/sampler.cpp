@@ -9,6 +9,10 @@
 namespace arbiter::top {
 namespace {
 
+std::string came_into_force(std::uint64_t generation) {
+  return "model " + std::to_string(generation) + " came into force";
+}
+
 std::chrono::system_clock::time_point earlier(std::chrono::system_clock::time_point wall,
                                               shm::Nanoseconds by) {
   return wall - std::chrono::duration_cast<std::chrono::system_clock::duration>(
@@ -129,7 +133,8 @@ void Sampler::take_seats() {
 
 Sampler::Seat Sampler::seat_at(shm::PortId port) const {
   Seat seat;
-  if (last_.snapshot.generation == 0) return seat;
+  seat.generation = last_.snapshot.generation;
+  if (seat.generation == 0) return seat;
   seat.is_arbitrated = last_.snapshot.table.is_arbitrated(port);
   seat.winner = last_.winner_at(port);
   return seat;
@@ -175,19 +180,29 @@ std::optional<shm::Nanoseconds> Sampler::oldest_at(const PortFact& port) const {
   return oldest;
 }
 
-// One that came before what is known already tells nothing new.
+// One that came before what is known already tells nothing new, and so does one that an earlier
+// model accepted. What a later model than that of the picture accepted, the next look tells.
 void Sampler::follow(const std::string& port, Seat& seat, const Accepted& accepted) {
   const auto source = instance_->find_source(accepted.source);
-  if (!source || *source == seat.winner || accepted.at < seat.since) return;
-  add_takeover(port, seat.winner, *source, accepted.at, accepted.source + " arrived");
-  seat = {*source, true, accepted.at, true};
+  if (!source || accepted.at < seat.since || accepted.generation < seat.generation ||
+      accepted.generation > last_.snapshot.generation) {
+    return;
+  }
+  // Whether the winner of before would have won without the arrival is not known: the model is
+  // named.
+  const bool is_of_another =
+      std::exchange(seat.generation, accepted.generation) != accepted.generation;
+  if (*source == seat.winner) return;
+  add_takeover(port, seat.winner, *source, accepted.at,
+               is_of_another ? came_into_force(accepted.generation) : accepted.source + " arrived");
+  seat = {*source, true, accepted.generation, accepted.at, true};
 }
 
 void Sampler::note_takeover(const std::string& port, shm::PortId id, const Seat& before,
                             Seat& now) {
   now.since = last_.now;
   now.is_exact = true;
-  std::string because = cause_of(id, now.since);
+  std::string because = cause_of(id, before.generation, now.since);
   add_takeover(port, before.winner, now.winner, now.since, std::move(because));
 }
 
@@ -205,9 +220,10 @@ void Sampler::add_takeover(const std::string& port, shm::SourceId before, shm::S
 }
 
 // `at`: when it happened, which was before it was seen.
-std::string Sampler::cause_of(shm::PortId port, shm::Nanoseconds& at) const {
-  if (before_.snapshot.generation != last_.snapshot.generation) {
-    return "model " + std::to_string(last_.snapshot.generation) + " came into force";
+std::string Sampler::cause_of(shm::PortId port, std::uint64_t generation_before,
+                              shm::Nanoseconds& at) const {
+  if (generation_before != last_.snapshot.generation) {
+    return came_into_force(last_.snapshot.generation);
   }
   const shm::TableView& table = last_.snapshot.table;
   const auto was = [this](shm::SourceId source) { return before_.is_active(source); };

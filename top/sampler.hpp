@@ -56,6 +56,7 @@ class Sampler {
   struct Seat {
     shm::SourceId winner = shm::kNone;
     bool is_arbitrated = false;
+    std::uint64_t generation = 0;  // of the model by which it wins
     shm::Nanoseconds since = 0;
     bool is_exact = false;
   };
@@ -70,7 +71,8 @@ class Sampler {
   void add_takeover(const std::string& port, shm::SourceId before, shm::SourceId winner,
                     shm::Nanoseconds at, std::string because);
   void note_takeover(const std::string& port, shm::PortId id, const Seat& before, Seat& now);
-  [[nodiscard]] std::string cause_of(shm::PortId port, shm::Nanoseconds& at) const;
+  [[nodiscard]] std::string cause_of(shm::PortId port, std::uint64_t generation_before,
+                                     shm::Nanoseconds& at) const;
   [[nodiscard]] std::string name_of(shm::SourceId source) const;
 
   const std::shared_ptr<watch::Instance> instance_;

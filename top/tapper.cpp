@@ -114,7 +114,7 @@ std::vector<Accepted> Tapper::collect() {
     while (const auto event = tap.take()) {
       if (event->at(port) != Fate::accepted) continue;
       result.push_back({port, event->source(), event->time().time_since_epoch().count(),
-                        event->kind() == TapEventKind::sample});
+                        event->kind() == TapEventKind::sample, event->generation()});
     }
     if (tap.lost() != 0) {
       problem_ = "of " + port + ", " + std::to_string(tap.lost()) +

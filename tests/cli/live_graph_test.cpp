@@ -148,6 +148,46 @@ TEST(LiveGraph, FollowsEachChangeUntilItIsInterrupted) {
   EXPECT_EQ(follower.wait(), 0);
 }
 
+// Returns once somebody has written the text to the pipe.
+void read_until(const shm::FileDescriptor& pipe, const std::string& text) {
+  std::string said;
+  while (said.find(text) == std::string::npos) {
+    char part[512];
+    const ssize_t count = ::read(pipe.get(), part, sizeof part);
+    ASSERT_GT(count, 0) << said;
+    said.append(part, static_cast<std::size_t>(count));
+  }
+}
+
+// It has asked the daemon before it draws, and has given up.
+TEST(LiveGraph, FollowsEachChangeWhileTheDaemonIsStopped) {
+  Daemon daemon(kLowAndHigh);
+  Node node("test");
+  auto low = node.output_port<int>("/low");
+  auto high = node.output_port<int>("/high");
+  const TemporaryDirectory directory;
+  const auto path = directory.path() + "/now.dot";
+  int ends[2];
+  ASSERT_EQ(::pipe2(ends, O_CLOEXEC), 0);
+  const shm::FileDescriptor err(ends[0]);
+  shm::FileDescriptor their_err(ends[1]);
+  ChildProcess follower({ARBITER_PROGRAMS "/arbiter", "graph", "--follow", "-o", path}, {},
+                        {-1, -1, their_err.get()});
+  their_err.reset();
+  wait_for_picture(path, "○ Low");
+  daemon.process().stop();
+  read_until(err, "has not answered in time");
+  low.signal();
+  wait_for_picture(path, "▶ Low");
+  high.signal();
+  wait_for_picture(path, "✕ Low");
+  daemon.process().resume();
+  high.deactivate();
+  wait_for_picture(path, "▶ Low");
+  follower.signal(SIGINT);
+  EXPECT_EQ(follower.wait(), 0);
+}
+
 TEST(LiveGraph, SaysThatTheDaemonHasGoneAndFollowsTheNext) {
   Daemon daemon(kLowAndHigh);
   const TemporaryDirectory directory;
@@ -161,13 +201,7 @@ TEST(LiveGraph, SaysThatTheDaemonHasGoneAndFollowsTheNext) {
   their_err.reset();
   wait_for_picture(path, "○ Low");
   daemon.terminate();
-  std::string said;
-  while (said.find("the daemon has gone") == std::string::npos) {
-    char part[512];
-    const ssize_t count = ::read(err.get(), part, sizeof part);
-    ASSERT_GT(count, 0) << said;
-    said.append(part, static_cast<std::size_t>(count));
-  }
+  read_until(err, "the daemon has gone");
   daemon.write_model(R"(<behaviors timeout="3600s">
     <behavior name="Next"><config at="/p">/high</config></behavior></behaviors>)");
   daemon.restart();

@@ -20,12 +20,13 @@ const std::string kModel = R"(<behaviors timeout="forever">
 
 class TopSampler : public testing::Test {
  protected:
-  void take_census() {
+  void take_census() { take_census(sampler_); }
+  void take_census(Sampler& sampler) {
     StampedStatus now;
     now.status = instance_->status();
     now.at = shm::monotonic_now();
     now.wall = std::chrono::system_clock::now();
-    sampler_.set_census(std::make_shared<const Census>(census_of(now, nullptr)));
+    sampler.set_census(std::make_shared<const Census>(census_of(now, nullptr)));
   }
   std::shared_ptr<const Frame> look() {
     sampler_.look();
@@ -111,18 +112,15 @@ TEST_F(TopSampler, ATapTellsOfWinnersThatComeAndGoBetweenTwoLooks) {
   auto high = node.output_port<int>("/high:o");
   std::vector<Accepted> told;
   Sampler tapping(instance_, [&told] { return std::exchange(told, {}); });
-  StampedStatus now;
-  now.status = instance_->status();
-  now.at = shm::monotonic_now();
-  tapping.set_census(std::make_shared<const Census>(census_of(now, nullptr)));
+  take_census(tapping);
   low.publish(1);
   tapping.look();
   const shm::Nanoseconds first = shm::monotonic_now();
   const shm::Nanoseconds later = first + 3600 * kSecond;  // of what has not been seen yet
-  told = {{"/p:i", "/low:o", first - kSecond},            // of what is known already
-          {"/p:i", "/high:o", first},          {"/p:i", "/low:o", first + 1},
-          {"/p:i", "/high:o", first + 2},      {"/other:i", "/high:o", first + 2},
-          {"/p:i", "/high:o", later}};
+  told = {{"/p:i", "/low:o", first - kSecond, true, 1},   // of what is known already
+          {"/p:i", "/high:o", first, true, 1},          {"/p:i", "/low:o", first + 1, true, 1},
+          {"/p:i", "/high:o", first + 2, true, 1},      {"/other:i", "/high:o", first + 2, true, 1},
+          {"/p:i", "/high:o", later, true, 1}};
   tapping.look();
   const auto takeovers = tapping.new_takeovers();
   ASSERT_EQ(takeovers.size(), 4u);
@@ -177,6 +175,57 @@ TEST_F(TopSampler, AnotherModelMayChangeTheWinner) {
   const auto takeovers = sampler_.new_takeovers();
   ASSERT_EQ(takeovers.size(), 1u);
   EXPECT_EQ(takeovers[0].because, "model 2 came into force");
+}
+
+// Both sources are active before and after.
+TEST_F(TopSampler, ATapDoesNotTakeTheFirstArrivalUnderAnotherModelForTheCause) {
+  Node node("test");
+  auto low = node.output_port<int>("/low:o");
+  auto high = node.output_port<int>("/high:o");
+  std::vector<Accepted> told;
+  Sampler tapping(instance_, [&told] { return std::exchange(told, {}); });
+  take_census(tapping);
+  low.publish(1);
+  high.publish(1);
+  tapping.look();
+  const shm::Nanoseconds first = shm::monotonic_now();
+  daemon_.load(R"(<behaviors timeout="forever">
+    <behavior name="Low"><config at="/p:i">/low:o</config></behavior>
+    <behavior name="High"><config at="/p:i">/high:o</config><condition>not /low:o</condition>
+    </behavior></behaviors>)");
+  instance_->catch_up();
+  told = {{"/p:i", "/high:o", first, true, 1},
+          {"/p:i", "/low:o", first + 1, true, 2},
+          {"/p:i", "/high:o", first + 2, true, 1},   // had been decided before
+          {"/p:i", "/high:o", first + 3, true, 3}};  // by what the picture does not know yet
+  tapping.look();
+  const auto takeovers = tapping.new_takeovers();
+  ASSERT_EQ(takeovers.size(), 1u);
+  EXPECT_EQ(takeovers[0].before, "/high:o");
+  EXPECT_EQ(takeovers[0].winner, "/low:o");
+  EXPECT_EQ(takeovers[0].at, first + 1);
+  EXPECT_EQ(takeovers[0].because, "model 2 came into force");
+}
+
+TEST_F(TopSampler, ATapTellsOfArrivalsUnderAnotherModelThatLeftTheWinner) {
+  Node node("test");
+  auto low = node.output_port<int>("/low:o");
+  auto high = node.output_port<int>("/high:o");
+  std::vector<Accepted> told;
+  Sampler tapping(instance_, [&told] { return std::exchange(told, {}); });
+  take_census(tapping);
+  low.publish(1);
+  tapping.look();
+  const shm::Nanoseconds first = shm::monotonic_now();
+  daemon_.load(kModel + "<!-- the same again -->");
+  instance_->catch_up();
+  high.publish(1);
+  told = {{"/p:i", "/low:o", first, true, 2}, {"/p:i", "/high:o", first + 1, true, 2}};
+  tapping.look();
+  const auto takeovers = tapping.new_takeovers();
+  ASSERT_EQ(takeovers.size(), 1u);
+  EXPECT_EQ(takeovers[0].winner, "/high:o");
+  EXPECT_EQ(takeovers[0].because, "/high:o arrived");
 }
 
 TEST_F(TopSampler, GoesOnWithoutADaemonAndWithTheNext) {
