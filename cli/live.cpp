@@ -82,17 +82,13 @@ std::shared_ptr<watch::Instance> follow_instance(const std::string& verb,
 }
 
 void DaemonNews::tell(const watch::Instance& instance) {
-  const std::uint64_t daemons = instance.daemons();
-  const bool is_another = daemons != std::exchange(daemons_, daemons) && daemons > 1;
-  const bool is_alone = !instance.has_daemon();
-  const bool was_alone = std::exchange(is_alone_, is_alone);
-  // One that was followed by another within a question has gone unseen.
-  if (!was_alone && (is_alone || is_another)) {
+  const watch::DaemonPresence::Change change = presence_.look(instance);
+  if (change.has_gone) {
     std::cerr
         << "arbiter: the daemon has gone; its last decisions stay in force, and arbiter keeps "
         << goes_on_ << " them\n";
   }
-  if (!is_alone && (was_alone || is_another)) std::cerr << "arbiter: a daemon is there again\n";
+  if (change.is_back) std::cerr << "arbiter: a daemon is there again\n";
 }
 
 ModelNews::Model ModelNews::in_force(const watch::Instance& instance) {

@@ -13,6 +13,7 @@
 #include "shm/activity.hpp"
 #include "shm/decision_memory.hpp"
 #include "shm/file_descriptor.hpp"
+#include "watch/daemon_presence.hpp"
 #include "watch/instance.hpp"
 #include "wire/call.hpp"
 #include "wire/status.hpp"
@@ -53,8 +54,7 @@ class DaemonNews {
 
  private:
   const std::string goes_on_;
-  bool is_alone_ = false;
-  std::uint64_t daemons_ = 0;
+  watch::DaemonPresence presence_;
 };
 
 // How often a verb that follows decisions looks, beside the times at which it knows that an

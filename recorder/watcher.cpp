@@ -74,15 +74,11 @@ void Watcher::run() {
 }
 
 void Watcher::tell_of_daemon() {
-  const std::uint64_t daemons = instance_->daemons();
-  const bool is_another = daemons != std::exchange(daemons_, daemons) && daemons > 1;
-  const bool is_alone = !instance_->has_daemon();
-  const bool was_alone = std::exchange(is_alone_, is_alone);
-  // One that was followed by another within a question has gone unseen.
-  if (!was_alone && (is_alone || is_another)) {
+  const watch::DaemonPresence::Change change = presence_.look(*instance_);
+  if (change.has_gone) {
     options_.say("the daemon has gone; its last decisions stay in force, and recording goes on");
   }
-  if (!is_alone && (was_alone || is_another)) options_.say("a daemon is there again");
+  if (change.is_back) options_.say("a daemon is there again");
 }
 
 void Watcher::look() {

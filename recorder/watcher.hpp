@@ -28,6 +28,7 @@
 #include "recorder/options.hpp"
 #include "recorder/record_queue.hpp"
 #include "recorder/tap_reader.hpp"
+#include "watch/daemon_presence.hpp"
 #include "watch/instance.hpp"
 #include "watch/model_in_force.hpp"
 
@@ -110,8 +111,7 @@ class Watcher {
   // Output ports and their processes, of components that the daemon does not know.
   std::set<std::pair<std::string, std::int32_t>> strangers_;
   OpenPorts ports_{0};
-  bool is_alone_ = false;
-  std::uint64_t daemons_ = 0;
+  watch::DaemonPresence presence_;
   Nanoseconds last_ports_ = 0;
   std::vector<std::shared_ptr<TapReader>> opened_;  // and not handed over yet
 
