@@ -159,6 +159,16 @@ void read_until(const shm::FileDescriptor& pipe, const std::string& text) {
   }
 }
 
+// `err`: where what it says can be read.
+ChildProcess follow(const std::string& path, shm::FileDescriptor& err) {
+  int ends[2];
+  if (::pipe2(ends, O_CLOEXEC) != 0) throw std::runtime_error("pipe2");
+  err.reset(ends[0]);
+  const shm::FileDescriptor their_err(ends[1]);
+  return ChildProcess({ARBITER_PROGRAMS "/arbiter", "graph", "--follow", "-o", path}, {},
+                      {-1, -1, their_err.get()});
+}
+
 // It has asked the daemon before it draws, and has given up.
 TEST(LiveGraph, FollowsEachChangeWhileTheDaemonIsStopped) {
   Daemon daemon(kLowAndHigh);
@@ -167,13 +177,8 @@ TEST(LiveGraph, FollowsEachChangeWhileTheDaemonIsStopped) {
   auto high = node.output_port<int>("/high");
   const TemporaryDirectory directory;
   const auto path = directory.path() + "/now.dot";
-  int ends[2];
-  ASSERT_EQ(::pipe2(ends, O_CLOEXEC), 0);
-  const shm::FileDescriptor err(ends[0]);
-  shm::FileDescriptor their_err(ends[1]);
-  ChildProcess follower({ARBITER_PROGRAMS "/arbiter", "graph", "--follow", "-o", path}, {},
-                        {-1, -1, their_err.get()});
-  their_err.reset();
+  shm::FileDescriptor err;
+  ChildProcess follower = follow(path, err);
   wait_for_picture(path, "○ Low");
   daemon.process().stop();
   read_until(err, "has not answered in time");
@@ -192,13 +197,8 @@ TEST(LiveGraph, SaysThatTheDaemonHasGoneAndFollowsTheNext) {
   Daemon daemon(kLowAndHigh);
   const TemporaryDirectory directory;
   const auto path = directory.path() + "/now.dot";
-  int ends[2];
-  ASSERT_EQ(::pipe2(ends, O_CLOEXEC), 0);
-  const shm::FileDescriptor err(ends[0]);
-  shm::FileDescriptor their_err(ends[1]);
-  ChildProcess follower({ARBITER_PROGRAMS "/arbiter", "graph", "--follow", "-o", path}, {},
-                        {-1, -1, their_err.get()});
-  their_err.reset();
+  shm::FileDescriptor err;
+  ChildProcess follower = follow(path, err);
   wait_for_picture(path, "○ Low");
   daemon.terminate();
   read_until(err, "the daemon has gone");

@@ -234,19 +234,36 @@ TEST(EndedNode, LeavesNothingOfAnOpeningThatItDidNotWaitFor) {
   EXPECT_EQ(other.tell("output /out"), "open");
 }
 
+// It has asked a stopped daemon for /out in vain; when it asks again, the daemon goes on.
+class NodeThatGaveUp {
+ public:
+  explicit NodeThatGaveUp(Daemon& daemon) : daemon_(daemon), node_("test", options()) {
+    daemon_.process().stop();
+    EXPECT_THROW(static_cast<void>(node_.output_port<Number>("/out")), Error);
+    is_second_ = true;
+  }
+  Node& node() { return node_; }
+
+ private:
+  NodeOptions options() {
+    NodeOptions options;
+    options.connect_timeout = std::chrono::milliseconds(0);
+    options.on_waiting = [this](const std::string&) {
+      if (is_second_) daemon_.process().resume();
+    };
+    return options;
+  }
+
+  Daemon& daemon_;
+  bool is_second_ = false;
+  Node node_;
+};
+
 // The daemon answers the first opening before the second, and gives the name to that.
 TEST(Opening, AgainAfterADaemonDidNotAnswerIsNotRefusedForTheFirst) {
   Daemon daemon(single_model());
-  bool is_second = false;
-  NodeOptions options;
-  options.connect_timeout = std::chrono::milliseconds(0);
-  options.on_waiting = [&](const std::string&) {
-    if (is_second) daemon.process().resume();
-  };
-  Node node("test", options);
-  daemon.process().stop();
-  EXPECT_THROW(static_cast<void>(node.output_port<Number>("/out")), Error);
-  is_second = true;
+  NodeThatGaveUp gave_up(daemon);
+  Node& node = gave_up.node();
   auto out = node.output_port<Number>("/out");
   EXPECT_EQ(out.publish(Number{1}).delivered, 0u);
 }
@@ -256,16 +273,8 @@ TEST(Opening, BehindOneThatWasGivenUpIsRefusedForAnother) {
   Daemon daemon(single_model());
   Component holder("holder");
   ASSERT_EQ(holder.tell("output /out"), "open");
-  bool is_second = false;
-  NodeOptions options;
-  options.connect_timeout = std::chrono::milliseconds(0);
-  options.on_waiting = [&](const std::string&) {
-    if (is_second) daemon.process().resume();
-  };
-  Node node("test", options);
-  daemon.process().stop();
-  EXPECT_THROW(static_cast<void>(node.output_port<Number>("/out")), Error);
-  is_second = true;
+  NodeThatGaveUp gave_up(daemon);
+  Node& node = gave_up.node();
   EXPECT_THAT(error_of([&] { auto out = node.output_port<Number>("/out"); }),
               HasSubstr("is held by node \"holder\""));
 }

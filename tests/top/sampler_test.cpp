@@ -45,6 +45,18 @@ class TopSampler : public testing::Test {
   Sampler sampler_{instance_};
 };
 
+// With both sources open, and what a tap tells of them in `told_`.
+class TappingSampler : public TopSampler {
+ protected:
+  TappingSampler() { take_census(tapping_); }
+
+  Node node_{"test"};
+  OutputPort<int> low_ = node_.output_port<int>("/low:o");
+  OutputPort<int> high_ = node_.output_port<int>("/high:o");
+  std::vector<Accepted> told_;
+  Sampler tapping_{instance_, [this] { return std::exchange(told_, {}); }};
+};
+
 TEST_F(TopSampler, HasNoPictureBeforeItKnowsThePorts) {
   EXPECT_EQ(look(), nullptr);
   take_census();
@@ -106,23 +118,18 @@ TEST_F(TopSampler, SinceIsWhenTheWinnerBegan) {
   EXPECT_EQ(look()->ports.at(0).since, state.since);  // it has gone on
 }
 
-TEST_F(TopSampler, ATapTellsOfWinnersThatComeAndGoBetweenTwoLooks) {
-  Node node("test");
-  auto low = node.output_port<int>("/low:o");
-  auto high = node.output_port<int>("/high:o");
-  std::vector<Accepted> told;
-  Sampler tapping(instance_, [&told] { return std::exchange(told, {}); });
-  take_census(tapping);
-  low.publish(1);
-  tapping.look();
+TEST_F(TappingSampler, ATapTellsOfWinnersThatComeAndGoBetweenTwoLooks) {
+  low_.publish(1);
+  tapping_.look();
   const shm::Nanoseconds first = shm::monotonic_now();
   const shm::Nanoseconds later = first + 3600 * kSecond;  // of what has not been seen yet
-  told = {{"/p:i", "/low:o", first - kSecond, true, 1},   // of what is known already
-          {"/p:i", "/high:o", first, true, 1},          {"/p:i", "/low:o", first + 1, true, 1},
-          {"/p:i", "/high:o", first + 2, true, 1},      {"/other:i", "/high:o", first + 2, true, 1},
-          {"/p:i", "/high:o", later, true, 1}};
-  tapping.look();
-  const auto takeovers = tapping.new_takeovers();
+  told_ = {
+      {"/p:i", "/low:o", first - kSecond, true, 1},  // of what is known already
+      {"/p:i", "/high:o", first, true, 1},          {"/p:i", "/low:o", first + 1, true, 1},
+      {"/p:i", "/high:o", first + 2, true, 1},      {"/other:i", "/high:o", first + 2, true, 1},
+      {"/p:i", "/high:o", later, true, 1}};
+  tapping_.look();
+  const auto takeovers = tapping_.new_takeovers();
   ASSERT_EQ(takeovers.size(), 4u);
   EXPECT_EQ(takeovers[0].winner, "/high:o");
   EXPECT_EQ(takeovers[0].at, first);
@@ -178,28 +185,22 @@ TEST_F(TopSampler, AnotherModelMayChangeTheWinner) {
 }
 
 // Both sources are active before and after.
-TEST_F(TopSampler, ATapDoesNotTakeTheFirstArrivalUnderAnotherModelForTheCause) {
-  Node node("test");
-  auto low = node.output_port<int>("/low:o");
-  auto high = node.output_port<int>("/high:o");
-  std::vector<Accepted> told;
-  Sampler tapping(instance_, [&told] { return std::exchange(told, {}); });
-  take_census(tapping);
-  low.publish(1);
-  high.publish(1);
-  tapping.look();
+TEST_F(TappingSampler, ATapDoesNotTakeTheFirstArrivalUnderAnotherModelForTheCause) {
+  low_.publish(1);
+  high_.publish(1);
+  tapping_.look();
   const shm::Nanoseconds first = shm::monotonic_now();
   daemon_.load(R"(<behaviors timeout="forever">
     <behavior name="Low"><config at="/p:i">/low:o</config></behavior>
     <behavior name="High"><config at="/p:i">/high:o</config><condition>not /low:o</condition>
     </behavior></behaviors>)");
   instance_->catch_up();
-  told = {{"/p:i", "/high:o", first, true, 1},
-          {"/p:i", "/low:o", first + 1, true, 2},
-          {"/p:i", "/high:o", first + 2, true, 1},   // had been decided before
-          {"/p:i", "/high:o", first + 3, true, 3}};  // by what the picture does not know yet
-  tapping.look();
-  const auto takeovers = tapping.new_takeovers();
+  told_ = {{"/p:i", "/high:o", first, true, 1},
+           {"/p:i", "/low:o", first + 1, true, 2},
+           {"/p:i", "/high:o", first + 2, true, 1},   // had been decided before
+           {"/p:i", "/high:o", first + 3, true, 3}};  // by what the picture does not know yet
+  tapping_.look();
+  const auto takeovers = tapping_.new_takeovers();
   ASSERT_EQ(takeovers.size(), 1u);
   EXPECT_EQ(takeovers[0].before, "/high:o");
   EXPECT_EQ(takeovers[0].winner, "/low:o");
@@ -207,22 +208,16 @@ TEST_F(TopSampler, ATapDoesNotTakeTheFirstArrivalUnderAnotherModelForTheCause) {
   EXPECT_EQ(takeovers[0].because, "model 2 came into force");
 }
 
-TEST_F(TopSampler, ATapTellsOfArrivalsUnderAnotherModelThatLeftTheWinner) {
-  Node node("test");
-  auto low = node.output_port<int>("/low:o");
-  auto high = node.output_port<int>("/high:o");
-  std::vector<Accepted> told;
-  Sampler tapping(instance_, [&told] { return std::exchange(told, {}); });
-  take_census(tapping);
-  low.publish(1);
-  tapping.look();
+TEST_F(TappingSampler, ATapTellsOfArrivalsUnderAnotherModelThatLeftTheWinner) {
+  low_.publish(1);
+  tapping_.look();
   const shm::Nanoseconds first = shm::monotonic_now();
   daemon_.load(kModel + "<!-- the same again -->");
   instance_->catch_up();
-  high.publish(1);
-  told = {{"/p:i", "/low:o", first, true, 2}, {"/p:i", "/high:o", first + 1, true, 2}};
-  tapping.look();
-  const auto takeovers = tapping.new_takeovers();
+  high_.publish(1);
+  told_ = {{"/p:i", "/low:o", first, true, 2}, {"/p:i", "/high:o", first + 1, true, 2}};
+  tapping_.look();
+  const auto takeovers = tapping_.new_takeovers();
   ASSERT_EQ(takeovers.size(), 1u);
   EXPECT_EQ(takeovers[0].winner, "/high:o");
   EXPECT_EQ(takeovers[0].because, "/high:o arrived");
