@@ -1,5 +1,5 @@
 // Clients that come back from somewhere that they never were, or claim what was never theirs.
-#include <dirent.h>
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/eventfd.h>
 #include <sys/resource.h>
@@ -24,6 +24,7 @@
 #include "tests/support/await.hpp"
 #include "tests/support/daemon.hpp"
 #include "tests/support/raw_port.hpp"
+#include "tests/support/resting.hpp"
 
 namespace arbiter::test {
 namespace {
@@ -227,17 +228,20 @@ TEST(HostileReturn, WithWhatTheDaemonHasNoDescriptorForCostsNobodyItsPort) {
       const std::filesystem::directory_iterator all(descriptors);
       return std::distance(begin(all), end(all));
     };
+    wait_until_all_rest(process);
     const auto before = count();
     std::vector<RawClient> others;
     const auto connect = [&] { others.emplace_back(daemon.instance()).hello(); };
     for (int i = 0; i < many; ++i) connect();
     RawClient poor = come_back();
+    wait_until_all_rest(process);
     for (int i = 0; i < 4; ++i) connect();  // in place of the conversation that this has ended
+    wait_until_all_rest(process);           // it neither closes any, nor sets its limit itself
     const rlim_t used = first_free();
     const rlimit none{used, used};  // where it receives, it raises the soft one
     ASSERT_EQ(::prlimit(process, RLIMIT_NOFILE, &none, nullptr), 0);
     hand_back(poor);
-    EXPECT_NE(poor.expect_refusal().find("no descriptor left"), std::string::npos);
+    EXPECT_THAT(poor.expect_refusal(), testing::HasSubstr("no descriptor left"));
     others.clear();
     await([&] { return count() <= before + 2; });  // those of the one that is left
     poor.send(RawClient::message(MessageKind::kHandedBack));
