@@ -20,10 +20,10 @@
 #include "command_line/wrong_use.hpp"
 #include "gateway/core/say.hpp"
 #include "gateway/core/stop_signals.hpp"
-#include "link/core/cards.hpp"
 #include "link/link.hpp"
 #include "rules/text/names.hpp"
 #include "shm/file_descriptor.hpp"
+#include "shm/utf8.hpp"
 #include "watch/machine.hpp"
 #include "wire/rendezvous.hpp"
 
@@ -45,9 +45,9 @@ shm::Nanoseconds read_max_age(const std::string& text) {
 
 // Throws CLI::ValidationError.
 void require_host_name(const std::string& host) {
-  if (is_host_name(host)) return;
+  if (shm::is_host_name(host)) return;
   throw CLI::ValidationError("--host", "\"" + host + "\" is not a host name: use 1 to " +
-                                           std::to_string(kMaxHostName) +
+                                           std::to_string(shm::kMaxHostName) +
                                            " letters, digits, dots, hyphens and underscores");
 }
 

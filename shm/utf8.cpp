@@ -1,5 +1,7 @@
 #include "shm/utf8.hpp"
 
+#include <algorithm>
+
 #include "shm/limits.hpp"
 
 namespace arbiter::shm {
@@ -61,6 +63,15 @@ std::optional<NameFault> find_fault_in_name(std::string_view name) {
 
 bool is_port_name(std::string_view name) {
   return name.size() <= kMaxNameLength && name.starts_with('/') && !find_fault_in_name(name);
+}
+
+bool is_host_name(std::string_view name) noexcept {
+  const auto is_fine = [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '.' ||
+           c == '-' || c == '_';
+  };
+  return !name.empty() && name.size() <= kMaxHostName &&
+         std::all_of(name.begin(), name.end(), is_fine);
 }
 
 std::string printable(std::string_view text, std::string_view kept) {

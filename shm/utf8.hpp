@@ -52,6 +52,11 @@ std::optional<NameFault> find_fault_in_name(std::string_view name);
 // Whether a port may be called so: at most kMaxNameLength bytes, the first '/', and no fault.
 bool is_port_name(std::string_view name);
 
+inline constexpr std::size_t kMaxHostName = 64;
+
+// Whether a host may be called so: 1 to kMaxHostName letters, digits, `.`, `-` and `_`.
+bool is_host_name(std::string_view name) noexcept;
+
 // `text` with control and invisible characters, and bytes that are not UTF-8, written as escapes: a
 // line end as \n, others as \xNN, byte by byte. Those in `kept`, which is ASCII, stay.
 std::string printable(std::string_view text, std::string_view kept = {});

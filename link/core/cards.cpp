@@ -1,7 +1,5 @@
 #include "link/core/cards.hpp"
 
-#include <algorithm>
-
 #include "link/core/card_bytes.hpp"
 #include "shm/limits.hpp"
 #include "shm/utf8.hpp"
@@ -14,15 +12,6 @@ constexpr std::uint32_t kTokenMagic = 0x54425241;   // "ARBT"
 constexpr std::uint32_t kDemandMagic = 0x44425241;  // "ARBD"
 
 }  // namespace
-
-bool is_host_name(const std::string& name) noexcept {
-  const auto is_fine = [](char c) {
-    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '.' ||
-           c == '-' || c == '_';
-  };
-  return !name.empty() && name.size() <= kMaxHostName &&
-         std::all_of(name.begin(), name.end(), is_fine);
-}
 
 ByteString write_offer_card(const OfferCard& card) {
   CardWriter writer(kOfferMagic, card.incarnation);
@@ -53,7 +42,7 @@ std::optional<OfferCard> read_offer_card(Bytes bytes) {
   CardReader reader(bytes, kOfferMagic);
   OfferCard card;
   card.incarnation = reader.number<std::uint64_t>();
-  card.host = reader.text(kMaxHostName);
+  card.host = reader.text(shm::kMaxHostName);
   card.source = reader.text(shm::kMaxNameLength);
   card.type_revision = reader.number<std::uint32_t>();
   if (card.type_revision != 0) {
@@ -64,7 +53,7 @@ std::optional<OfferCard> read_offer_card(Bytes bytes) {
     card.type.set_name(name);
     if (shm::fault_of(card.type)) return std::nullopt;
   }
-  if (!reader.is_good() || card.incarnation == 0 || !is_host_name(card.host) ||
+  if (!reader.is_good() || card.incarnation == 0 || !shm::is_host_name(card.host) ||
       !shm::is_port_name(card.source)) {
     return std::nullopt;
   }

@@ -28,8 +28,6 @@
 
 namespace arbiter::link {
 
-inline constexpr std::size_t kMaxHostName = 64;
-
 // Of a writer: an output port that is open there.
 struct OfferCard {
   // Of this offer. The port that is opened again is another one.
@@ -60,8 +58,5 @@ struct DemandCard {
 [[nodiscard]] std::optional<OfferCard> read_offer_card(Bytes bytes);
 [[nodiscard]] std::optional<TokenMessage> read_token_message(Bytes bytes);
 [[nodiscard]] std::optional<DemandCard> read_demand_card(Bytes bytes);
-
-// Whether links may call a host so: 1 to kMaxHostName letters, digits, `.`, `-` and `_`.
-[[nodiscard]] bool is_host_name(const std::string& name) noexcept;
 
 }  // namespace arbiter::link

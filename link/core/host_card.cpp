@@ -18,7 +18,7 @@ constexpr std::size_t kMostPortBytes = (kMaxCardBytes - 1024) / 2;
 bool is_plain(const std::string& text) { return shm::printable(text) == text; }
 
 bool is_instance_name(const std::string& name) {
-  return !name.empty() && name.front() != '.' && is_host_name(name);
+  return !name.empty() && name.front() != '.' && shm::is_host_name(name);
 }
 
 // As many as there is room for.
@@ -67,8 +67,8 @@ std::optional<HostCard> read_host_card(Bytes bytes) {
   CardReader reader(bytes, kHostMagic);
   HostCard card;
   card.incarnation = reader.number<std::uint64_t>();
-  card.host = reader.text(kMaxHostName);
-  card.instance = reader.text(kMaxHostName);
+  card.host = reader.text(shm::kMaxHostName);
+  card.instance = reader.text(shm::kMaxHostName);
   card.version = reader.text(kMaxVersionName);
   const auto flags = reader.number<std::uint8_t>();
   card.has_daemon = flags == kHasDaemon;
@@ -76,7 +76,7 @@ std::optional<HostCard> read_host_card(Bytes bytes) {
   card.digest = reader.number<std::uint64_t>();
   card.model = reader.text(kMaxModelName);
   card.imports = reader.number<std::uint32_t>();
-  reader.require(card.incarnation != 0 && flags <= kHasDaemon && is_host_name(card.host) &&
+  reader.require(card.incarnation != 0 && flags <= kHasDaemon && shm::is_host_name(card.host) &&
                  is_instance_name(card.instance) && is_plain(card.version) && is_plain(card.model));
   read_ports(reader, card.input_count, card.inputs);
   read_ports(reader, card.output_count, card.outputs);

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "link/core/card_bytes.hpp"
+#include "shm/utf8.hpp"
 
 namespace arbiter::link {
 namespace {
@@ -40,10 +41,10 @@ std::optional<QuestionMessage> read_question(Bytes bytes) {
   for (std::size_t i = 0; i < count && reader.is_good(); ++i) {
     message.asked.push_back(reader.number<std::uint64_t>());
   }
-  message.host = reader.text(kMaxHostName);
+  message.host = reader.text(shm::kMaxHostName);
   message.verb = reader.text(kMaxVerb);
   message.argument = reader.long_text(kMaxArgument);
-  reader.require(message.asker != 0 && message.number != 0 && is_host_name(message.host) &&
+  reader.require(message.asker != 0 && message.number != 0 && shm::is_host_name(message.host) &&
                  is_verb(message.verb));
   if (!reader.is_good()) return std::nullopt;
   return message;

@@ -10,6 +10,7 @@
 #include "link/core/pulse.hpp"
 #include "link/core/questions.hpp"
 #include "link/core/topic_names.hpp"
+#include "shm/utf8.hpp"
 #include "tests/fuzz/fuzz.hpp"
 #include "tests/fuzz/link_sequences.hpp"
 #include "wire/document.hpp"
@@ -38,7 +39,7 @@ void check_event(Bytes bytes) {
 
 void check_cards(Bytes bytes) {
   if (const auto card = read_offer_card(bytes)) {
-    require(is_host_name(card->host), "a host has a name");
+    require(shm::is_host_name(card->host), "a host has a name");
     require(card->source.size() <= shm::kMaxNameLength, "a source's name is bounded");
     require(card->type_revision == 0 || !shm::fault_of(card->type), "a type is a port's");
     require(topic_of_source(card->source).size() < 1024, "a topic's name is bounded");
@@ -57,7 +58,7 @@ void check_cards(Bytes bytes) {
 
 void check_hosts(Bytes bytes) {
   if (const auto card = read_host_card(bytes)) {
-    require(is_host_name(card->host), "a host has a name");
+    require(shm::is_host_name(card->host), "a host has a name");
     require(card->inputs.size() <= kMaxPortsOfCard, "the ports are bounded");
     require(card->inputs.size() <= card->input_count, "none is there that is not counted");
     require(is_beginning(write_host_card(*card), bytes), "a host's card is what was written");

@@ -13,6 +13,7 @@
 #include "link/core/said_type.hpp"
 #include "link/core/topic_names.hpp"
 #include "link/core/what_passes.hpp"
+#include "shm/utf8.hpp"
 
 namespace arbiter::link {
 namespace {
@@ -189,8 +190,9 @@ TEST(Cards, NamesThatWouldMisleadAreNobodys) {
     const ByteString bytes = write_offer_card(card);
     EXPECT_FALSE(read_offer_card(Bytes(bytes.data(), bytes.size()))) << name;
   }
-  for (const std::string& name : {std::string(), std::string("a b"), std::string("\033[2J"),
-                                  std::string("h\xc3\xa9"), std::string(kMaxHostName + 1, 'a')}) {
+  for (const std::string& name :
+       {std::string(), std::string("a b"), std::string("\033[2J"), std::string("h\xc3\xa9"),
+        std::string(shm::kMaxHostName + 1, 'a')}) {
     OfferCard card;
     card.incarnation = 3;
     card.host = name;
