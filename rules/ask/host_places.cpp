@@ -11,15 +11,6 @@
 namespace arbiter::rules {
 namespace {
 
-constexpr std::size_t kMaxHostBytes = 64;  // as links have it
-
-bool may_be_host(std::string_view node) {
-  return node.size() <= kMaxHostBytes && std::all_of(node.begin(), node.end(), [](char each) {
-           return (each >= 'a' && each <= 'z') || (each >= '0' && each <= '9') || each == '.' ||
-                  each == '-' || each == '_' || each == ':';
-         });
-}
-
 // "base and head, by the modules "armControl" (app.xml:3:5) and "spare" (app.xml:8:5)".
 std::string in_words(const std::vector<std::string>& hosts,
                      const std::vector<const Module*>& modules) {
@@ -55,8 +46,8 @@ class Placement {
  private:
   // Each module is reported once, at the first port that it has.
   bool has_host(const Module& module, const std::string& port, const Subject& about) {
-    const bool is_fine = !module.node.empty() && may_be_host(module.node);
-    if (is_fine || !reported_.insert(&module).second) return is_fine;
+    const auto problem = find_problem_in_host(module.node);
+    if (!problem || !reported_.insert(&module).second) return !problem;
     if (module.node.empty()) {
       diagnostics_.error("no-node", module.where,
                          "the module " + quote(module.name) +
@@ -65,12 +56,7 @@ class Placement {
                          about);
     } else {
       diagnostics_.error("bad-node", module.where,
-                         "the <node> of the module " + quote(module.name) + ", " +
-                             quote(module.node) +
-                             ", is no name of a host; write letters, digits, '.', '-', '_' or "
-                             "':', at most " +
-                             std::to_string(kMaxHostBytes) + " of them",
-                         about);
+                         "the <node> of the module " + quote(module.name) + ": " + *problem, about);
     }
     return false;
   }

@@ -103,11 +103,16 @@ void add_subject(Json& object, const Subject& about) {
   }
 }
 
-// What to do stands behind the last semicolon of a message.
+// What to do stands behind the last semicolon of a message, but for those in names: quote() leaves
+// no quotes within them.
 std::optional<std::string> help_of(const Diagnostic& item) {
-  const std::size_t at = item.message.rfind("; ");
-  if (at == std::string::npos) return std::nullopt;
-  return item.message.substr(at + 2);
+  std::optional<std::size_t> at;
+  bool is_quoted = false;
+  for (std::size_t i = 0; i + 1 < item.message.size(); ++i) {
+    if (item.message[i] == '"') is_quoted = !is_quoted;
+    if (!is_quoted && item.message.compare(i, 2, "; ") == 0) at = i + 2;
+  }
+  return at ? std::optional(item.message.substr(*at)) : std::nullopt;
 }
 
 void write_item(std::ostream& out, const Diagnostic& item, Excerpts& excerpts) {

@@ -9,7 +9,9 @@
 namespace arbiter::rules {
 
 std::string describe(const Location& where) {
-  return where.file + ':' + std::to_string(where.line) + ':' + std::to_string(where.column);
+  const bool misleads = where.file.find_first_of("\";") != std::string::npos;
+  return (misleads ? quote_whole(where.file) : where.file) + ':' + std::to_string(where.line) +
+         ':' + std::to_string(where.column);
 }
 
 std::string in_words(const Witness& witness) {

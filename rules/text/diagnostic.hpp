@@ -21,7 +21,8 @@ struct Location {
   friend bool operator==(const Location&, const Location&) = default;
 };
 
-// file:line:column, to point at a second place from within a message.
+// file:line:column, to point at a second place from within a message. A file's name with a quote or
+// a semicolon in it stands in quotes.
 std::string describe(const Location& where);
 
 enum class Severity { kError, kWarning, kNote };

@@ -92,8 +92,14 @@ std::string collapse_blanks(std::string_view text) {
 
 std::string quote(std::string_view name) {
   constexpr std::size_t kMaxQuoted = 80;
-  if (name.size() <= kMaxQuoted) return '"' + std::string(name) + '"';
-  return '"' + std::string(shm::beginning_of(name, kMaxQuoted)) + "…\"";
+  if (name.size() <= kMaxQuoted) return quote_whole(name);
+  return quote_whole(std::string(shm::beginning_of(name, kMaxQuoted)) + "…");
+}
+
+std::string quote_whole(std::string_view name) {
+  std::string quoted = '"' + std::string(name) + '"';
+  std::replace(quoted.begin() + 1, quoted.end() - 1, '"', '\'');
+  return quoted;
 }
 
 std::string enumerate(const std::vector<std::string>& names) {
@@ -119,9 +125,14 @@ std::string counted(std::uint64_t count, std::string_view thing) {
 std::optional<NameProblem> find_problem_in_port(std::string_view name) {
   if (auto problem = find_length_problem(name)) return problem;
   if (name.size() > 2 && name.starts_with("\"/") && name.ends_with('"')) {
+    const std::string_view within = name.substr(1, name.size() - 2);
+    if (auto problem = find_problem_in_port(within)) {
+      ++problem->at;
+      return problem;
+    }
     return NameProblem{"invalid-port-name",
                        "only in a condition does a port's name have quotes; write " +
-                           std::string(name.substr(1, name.size() - 2)) + " without them",
+                           std::string(within) + " without them",
                        0};
   }
   if (name.starts_with('$')) {
@@ -163,6 +174,13 @@ std::optional<NameProblem> find_problem_in_foreign_port(std::string_view name) {
                      "a port's name has no line ends or other control characters in it; "
                      "remove them",
                      static_cast<std::size_t>(found - name.begin())};
+}
+
+std::optional<std::string> find_problem_in_host(std::string_view name) {
+  if (shm::is_host_name(name)) return {};
+  return quote(name) + " is no name of a host, and no link takes it; write at most " +
+         std::to_string(shm::kMaxHostName) +
+         " letters, digits, '.', '-' and '_', as behind the --host of its link";
 }
 
 std::optional<NameProblem> find_problem_in_behaviour(std::string_view name) {

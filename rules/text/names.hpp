@@ -15,8 +15,10 @@ std::string_view trim(std::string_view text);
 // Trimmed, and each run of white space inside made one blank.
 std::string collapse_blanks(std::string_view text);
 
-// In double quotes, and cut where it is too long for a message.
+// In double quotes, with single ones for those within it, so that what reads a message sees where
+// the name ends. quote() cuts what is too long for a message.
 std::string quote(std::string_view name);
+std::string quote_whole(std::string_view name);
 
 // Names that a sentence spells out; of more it says how many.
 inline constexpr std::size_t kMaxNamesInWords = 6;
@@ -43,6 +45,9 @@ std::optional<NameProblem> find_problem_in_port(std::string_view name);
 
 // A port in an application file, which may be none of ours: "topic://map" is fine there.
 std::optional<NameProblem> find_problem_in_foreign_port(std::string_view name);
+
+// The name of a host, as links take it.
+std::optional<std::string> find_problem_in_host(std::string_view name);
 
 // The name of a behaviour or meta-behaviour. A comma would take it apart in an <inhibition>.
 std::optional<NameProblem> find_problem_in_behaviour(std::string_view name);

@@ -142,6 +142,20 @@ TEST(AcrossHosts, AModuleMustSayWhereItRunsIfAPortOfTheModelIsIts) {
   EXPECT_THAT(check(kArm, "").findings(), ElementsAre("error no-modules"));
 }
 
+TEST(AcrossHosts, ANodeIsANameThatALinkTakes) {
+  const auto others = module("Rest", "base") + module("Eye", "base");
+  const auto checked = check(kArm, module("Arm", "head:1") + others);
+  ASSERT_THAT(checked.findings(), ElementsAre("error bad-node /Arm:i"));
+  EXPECT_THAT(checked.items[0].message,
+              HasSubstr("\"head:1\" is no name of a host, and no link takes it; write at most 64 "
+                        "letters, digits, '.', '-' and '_', as behind the --host of its link"));
+  const std::string longest(64, 'a');
+  const std::string on_longest = module("Rest", longest) + module("Eye", longest);
+  EXPECT_THAT(check(kArm, module("Arm", longest) + on_longest).findings(), IsEmpty());
+  EXPECT_THAT(check(kArm, module("Arm", longest + 'a') + on_longest).findings(),
+              ElementsAre("error bad-node /Arm:i"));
+}
+
 TEST(AcrossHosts, OnTwoHostsAnInputPortIsAnErrorAndASourceAWarning) {
   const auto checked =
       check(kArm, module("Arm", "base") + module("Arm", "spare") + module("Rest", "base") +

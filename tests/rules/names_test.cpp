@@ -68,6 +68,7 @@ TEST(Names, LongerThanTheLimitAreRefused) {
 
 TEST(Names, ThatAreLongAreCutInMessagesBetweenCharacters) {
   EXPECT_EQ(quote("short"), "\"short\"");
+  EXPECT_EQ(quote("say \"hi\""), "\"say 'hi'\"");
   EXPECT_EQ(quote(std::string(200, 'x')), '"' + std::string(80, 'x') + "…\"");
   EXPECT_EQ(quote(std::string(79, 'x') + "ä" + std::string(9, 'x')),
             '"' + std::string(79, 'x') + "…\"");

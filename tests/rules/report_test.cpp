@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "rules/prove/winners.hpp"
+#include "rules/text/names.hpp"
 
 namespace arbiter::test {
 namespace {
@@ -170,6 +171,23 @@ TEST(Report, WritesJsonForPrograms) {
      "more_witnesses": [],
      "port": null, "ports": [], "source": null, "behaviour": null, "statement": null,
      "winners": []}])"));
+}
+
+TEST(Report, TakesNoSemicolonOfANameForTheBeginningOfTheHelp) {
+  const auto help_of = [](const std::string& message) {
+    Diagnostics diagnostics;
+    diagnostics.error("e", {"m.xml", 1, 1}, message);
+    return json_of(diagnostics)[0]["help"];
+  };
+  for (const std::string name : {"a; b", "a\"; b", "\"a\"; b\"", "a; \"b", "a;\\", "\\\"; b"}) {
+    const std::string quoted = rules::quote(name);
+    EXPECT_EQ(help_of("one; rename " + quoted), "rename " + quoted);
+    EXPECT_EQ(help_of(quoted + " is one; mend it"), "mend it");
+    EXPECT_TRUE(help_of("there is " + quoted).is_null());
+  }
+  const std::string place = rules::describe({"a; \"b.xml", 3, 4});
+  EXPECT_EQ(place, "\"a; 'b.xml\":3:4");
+  EXPECT_EQ(help_of("the other one is at " + place + "; remove " + place), "remove " + place);
 }
 
 TEST(Report, NamesWhatAFindingIsAboutInFieldsOfTheirOwn) {
