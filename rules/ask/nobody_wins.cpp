@@ -31,6 +31,7 @@ class PortFindings {
       : rules_(rules), port_(port), statements_(statements), diagnostics_(diagnostics) {}
 
   void find(Budget& budget) {
+    budget_ = &budget;
     SourceOrder order;
     order.add(port_);
     add_sources(statements_, order);
@@ -203,6 +204,7 @@ class PortFindings {
     std::vector<std::vector<std::size_t>> ways{{first}};
     for (std::size_t at = 0; at < ways.size(); ++at) {
       const std::vector<std::size_t> way = ways[at];
+      budget_->spend(way.size() * candidates_.size());  // to look along it for each that may follow
       for (std::size_t next = first; next < candidates_.size(); ++next) {
         if (!keeps_out_[next][way.back()]) continue;
         if (next == first) {
@@ -376,6 +378,7 @@ class PortFindings {
   const CompiledPort& port_;
   const ProvedStatements& statements_;  // that speak of the port
   Diagnostics& diagnostics_;
+  Budget* budget_ = nullptr;
   Winners* winners_ = nullptr;
   std::vector<Candidate> candidates_;  // connections that can win
   Diagram nobody_;

@@ -25,7 +25,8 @@ rules::RuleSet robot() {
 }
 
 // What is found where all of these statements are proved, or not.
-std::vector<rules::Diagnostic> items_beside(const rules::RuleSet& set, const std::string& text) {
+std::vector<rules::Diagnostic> items_beside(const rules::RuleSet& set, const std::string& text,
+                                            std::uint64_t* spent = nullptr) {
   Diagnostics diagnostics;
   const auto model = compile(set, diagnostics);
   rules::ProvedStatements proved;
@@ -38,6 +39,7 @@ std::vector<rules::Diagnostic> items_beside(const rules::RuleSet& set, const std
   Diagnostics found;
   rules::Budget budget;
   find_more(set, model, found, budget, proved);
+  if (spent != nullptr) *spent = budget.spent();
   return found.items();
 }
 
@@ -139,6 +141,28 @@ std::string circle_beside(const std::string& text) {
 TEST(StatedFindings, ACircleThatIsToBeIdleIsNone) {
   EXPECT_EQ(circle_beside("/x and /y -> idle(/q)"), "/a /b ");
   EXPECT_EQ(circle_beside("/a and /b -> idle(/p)"), "");
+}
+
+// Behind the circle that is to be idle, many ways lead on.
+TEST(StatedFindings, WaysToOtherCirclesTakeStepsOfTheBudget) {
+  std::vector<std::pair<std::string, ExpressionPtr>> rules{{"/b", inactive("/a")}};
+  std::vector<ExpressionPtr> of_a{inactive("/b")};
+  std::vector<ExpressionPtr> above{inactive("/stop")};
+  for (int i = 0; i < 60; ++i) {
+    const std::string name = "/c" + std::to_string(i);
+    of_a.push_back(inactive(name));
+    rules.emplace_back(name, all_of(above));
+    above.push_back(inactive(name));
+  }
+  rules.emplace_back("/a", all_of(of_a));
+  const auto steps_beside = [&](const std::string& statement) {
+    std::uint64_t steps = 0;
+    const auto set = RulesByHand().port("/p", rules);
+    EXPECT_THAT(items_beside(set, statement, &steps), testing::Not(IsEmpty()));
+    return steps;
+  };
+  const auto one_circle = steps_beside("/a and /b and none(/c*) -> idle(/p)");
+  EXPECT_GT(one_circle, steps_beside("/x or not /x") + 100'000);
 }
 
 TEST(StatedFindings, ACircleIsToldThatSharesAnInhibitionWithOneThatIsToBeIdle) {
