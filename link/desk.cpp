@@ -166,6 +166,11 @@ void Desk::send_card() {
 
 void Desk::look_at_others() {
   const shm::Nanoseconds now = shm::monotonic_now();  // before: meanwhile others may come
+  look_who_is_there(now);
+  compare_with_others(now);
+}
+
+void Desk::look_who_is_there(shm::Nanoseconds now) {
   const std::vector<std::uint64_t> writers = topics_->cards.writers();
   std::size_t without_place = 0;
   std::set<std::string> deaf_hosts;
@@ -188,6 +193,11 @@ void Desk::look_at_others() {
   say_without_place(without_place);
   say_who_is_there(hosts_there);
   say_deaf(deaf_hosts);
+}
+
+// For a while after each change; and without the lock, for which samples may wait: what strangers
+// say may be much.
+void Desk::compare_with_others(shm::Nanoseconds now) {
   std::vector<Neighbour> neighbours;
   {
     const std::lock_guard lock(mutex_);
@@ -197,7 +207,6 @@ void Desk::look_at_others() {
     compare_again_ = now + kCompareEvery;
     neighbours = neighbours_.all();
   }
-  // Without the lock, for which samples may wait: what strangers say may be much.
   std::vector<PresentHost> hosts{{&own_->card, began_}};
   for (const Neighbour& each : neighbours) {
     if (each.is_up) hosts.push_back({each.card.get(), each.since});

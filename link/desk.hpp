@@ -83,6 +83,8 @@ class Desk {
   void open_socket();
   void send_card();
   void look_at_others();
+  void look_who_is_there(shm::Nanoseconds now);
+  void compare_with_others(shm::Nanoseconds now);
   void say_without_place(std::size_t count);
   void say_deaf(const std::set<std::string>& hosts);
   void say_who_is_there(const std::set<std::string>& hosts);

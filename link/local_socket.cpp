@@ -92,10 +92,11 @@ struct LocalSocket::Shared {
   bool take_place(uid_t user, int socket) {
     const std::lock_guard lock(mutex);
     const bool is_privileged = user == 0 || user == ::geteuid();
-    if (ends || of_user[user] >= kMostOfUser || (count >= kMost && !is_privileged)) return false;
-    ++of_user[user];
+    unsigned& own = of_user[user];
+    if (ends || own >= kMostOfUser || (count >= kMost && !is_privileged)) return false;
+    conversations.insert(socket);  // or throws before anything is counted
+    ++own;
     ++count;
-    conversations.insert(socket);
     return true;
   }
   void give_back_place(uid_t user) {
@@ -197,9 +198,22 @@ void LocalSocket::turn_away(shm::FileDescriptor socket, uid_t user) {
   if (is_stuck(user)) stuck_.insert(user);
 }
 
-// Until it has gone. May be lost for long in the descriptors that a program has sent: it keeps what
-// it needs, and a place of that user.
+// May be lost for long in the descriptors that a program has sent: it keeps what it needs, and a
+// place of that user.
 void LocalSocket::serve_program(Shared& shared, const LocalUser& who, shm::FileDescriptor& socket) {
+  try {
+    converse(shared, who, socket);
+  } catch (const std::exception&) {
+    // No memory is left, not even to say so: the program sees that the link has hung up.
+  }
+  shared.end_conversation(socket.get());
+  socket.reset();
+  shared.give_back_place(who.user);
+}
+
+// Until the program has gone.
+void LocalSocket::converse(Shared& shared, const LocalUser& who,
+                           const shm::FileDescriptor& socket) {
   ::setsockopt(socket.get(), SOL_SOCKET, SO_RCVTIMEO, &kPatience, sizeof kPatience);
   ::setsockopt(socket.get(), SOL_SOCKET, SO_SNDTIMEO, &kPatience, sizeof kPatience);
   std::string packet(wire::kMaxLinkPacket, '\0');
@@ -217,9 +231,6 @@ void LocalSocket::serve_program(Shared& shared, const LocalUser& who, shm::FileD
     }
     if (!why_not.empty()) is_sent = refuse(socket.get(), why_not);
   }
-  shared.end_conversation(socket.get());
-  socket.reset();
-  shared.give_back_place(who.user);
 }
 
 void LocalSocket::let_in() {
@@ -239,14 +250,14 @@ void LocalSocket::let_in() {
   } catch (const std::system_error&) {  // it has gone
     return turn_away(std::move(socket), kNobody);
   }
-  if (!shared_->take_place(who.user, socket.get())) {
-    refuse(socket.get(), "too many programs ask the link at once");
-    return turn_away(std::move(socket), who.user);
+  const auto one = std::make_shared<shm::FileDescriptor>(std::move(socket));
+  if (!shared_->take_place(who.user, one->get())) {
+    refuse(one->get(), "too many programs ask the link at once");
+    return turn_away(std::move(*one), who.user);
   }
-  auto one = std::make_shared<shm::FileDescriptor>(std::move(socket));
   try {
     std::thread([shared = shared_, who, one] { serve_program(*shared, who, *one); }).detach();
-  } catch (const std::system_error&) {  // no thread is left
+  } catch (const std::exception&) {  // no thread is left, or no memory
     shared_->end_conversation(one->get());
     shared_->give_back_place(who.user);
     turn_away(std::move(*one), who.user);

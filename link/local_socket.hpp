@@ -52,6 +52,7 @@ class LocalSocket {
   void let_in();
   void turn_away(shm::FileDescriptor socket, uid_t user);
   static void serve_program(Shared& shared, const LocalUser& who, shm::FileDescriptor& socket);
+  static void converse(Shared& shared, const LocalUser& who, const shm::FileDescriptor& socket);
 
   wire::Listener listener_;
   shm::FileDescriptor end_;  // readable: it is over

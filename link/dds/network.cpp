@@ -53,8 +53,9 @@ constexpr std::chrono::milliseconds kEndsCutOffWithin{50};
 std::vector<int> datagram_sockets() {
   std::vector<int> sockets;
   std::error_code error;
-  for (const auto& each : std::filesystem::directory_iterator("/proc/self/fd", error)) {
-    const int fd = std::atoi(each.path().filename().c_str());
+  std::filesystem::directory_iterator each("/proc/self/fd", error);
+  for (; !error && each != std::filesystem::directory_iterator(); each.increment(error)) {
+    const int fd = std::atoi(each->path().filename().c_str());
     int domain = 0;
     int type = 0;
     socklen_t size = sizeof domain;

@@ -5,11 +5,15 @@
 #include <sys/socket.h>
 #include <sys/un.h>
 
+#include <atomic>
 #include <csignal>
+#include <cstdlib>
 #include <filesystem>
 #include <future>
+#include <new>
 #include <optional>
 #include <span>
+#include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
@@ -24,6 +28,23 @@
 #include "wire/hosts.hpp"
 #include "wire/link_call.hpp"
 #include "wire/rendezvous.hpp"
+
+namespace arbiter::test {
+namespace {
+
+// Of this thread: there is no memory from now on.
+thread_local bool is_out_of_memory = false;
+
+}  // namespace
+}  // namespace arbiter::test
+
+void* operator new(std::size_t size) {
+  void* const memory = arbiter::test::is_out_of_memory ? nullptr : std::malloc(size);
+  if (memory == nullptr) throw std::bad_alloc();
+  return memory;
+}
+void operator delete(void* memory) noexcept { std::free(memory); }
+void operator delete(void* memory, std::size_t /*size*/) noexcept { std::free(memory); }
 
 namespace arbiter::test {
 namespace {
@@ -126,6 +147,22 @@ TEST_F(LocalSocketOfALink, SaysThatItCannotLetInWhoComes) {
                       "trying again"),
             std::string::npos)
       << said;
+}
+
+TEST_F(LocalSocketOfALink, HangsUpWhereItHasNoMemoryToSayWhy) {
+  std::atomic<int> asked = 0;
+  link::LocalSocket socket("here", [&](const link::LocalUser&, const wire::LinkQuestion&) {
+    const std::runtime_error why("there is no memory for this answer");
+    is_out_of_memory = asked++ == 0;
+    if (is_out_of_memory) throw why;
+    return std::string("{}");
+  });
+  const Asker asker;
+  asker.ask();
+  EXPECT_FALSE(asker.is_answered());
+  const Asker another;
+  another.ask();
+  EXPECT_TRUE(another.is_answered());
 }
 
 TEST_F(LocalSocketOfALink, AnswersWhoHasAskedBeforeItCloses) {
