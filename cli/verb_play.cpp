@@ -9,6 +9,7 @@
 #include <iostream>
 #include <map>
 #include <memory>
+#include <optional>
 #include <set>
 #include <string>
 #include <utility>
@@ -50,86 +51,61 @@ NodeOptions node_options(const std::string& instance) {
   return options;
 }
 
-// Who has the input ports open that the model connects the trace's sources to. Looked at anew where
-// a source meets another number of them than before.
-class PlayedPorts {
+// An output port, and its tap: Outcome counts ports, and a tap names them.
+class PlayedSource {
  public:
-  explicit PlayedPorts(const std::string& instance) : caller_(caller("play", instance)) {}
+  PlayedSource(Node& node, const std::string& name)
+      : output_(node.output_port<std::uint64_t>(name)), tap_(tap_of(node, name)) {
+    output_.require_replay();
+  }
 
-  void look() {
-    next_look_ = shm::monotonic_now() + kLookAgain;
-    is_stale_ = false;
-    try {
-      status_ = fetch_status(caller_, kPatience);
-    } catch (const wire::CallError&) {
-      // The daemon has gone, or is busy: what was so is taken to be so.
+  void publish_at(Time at, std::uint64_t value) {
+    last_.reset();
+    output_.publish_at(at, value);
+    while (auto event = tap_.take()) {
+      if (event->kind() == TapEventKind::sample) last_.emplace(std::move(*event));
     }
   }
+  void deactivate_at(Time at) { output_.deactivate_at(at); }
 
-  // `met`: at how many input ports something became of an arrival of the source.
-  void note_arrival(const std::string& source, std::uint32_t met) {
-    const auto known = met_.try_emplace(source, open_inputs_of(source)).first;
-    is_stale_ = std::exchange(known->second, met) != met || is_stale_;
-    if (is_stale_ && shm::monotonic_now() >= next_look_) look();
-  }
-
-  // "not open", "refused"; empty: nothing hinders it.
-  [[nodiscard]] std::string hindrance(const std::string& source, const std::string& port) const {
-    const wire::InputStatus* const input = status_.find_input(port);
-    if (input == nullptr || !input->open) return "not open";
-    const auto* const connection = connection_of(*input, source);
-    return connection != nullptr && connection->mismatch ? "refused" : "";
-  }
-
-  // Of these sources. Ports that refuse them, notices name.
-  void say_what_is_not_open(const std::set<std::string>& sources) const {
-    for (const wire::InputStatus& input : status_.inputs) {
-      std::vector<std::string> connected;
-      for (const std::string& source : sources) {
-        if (connection_of(input, source) != nullptr) connected.push_back(source);
-      }
-      if (input.open || connected.empty()) continue;
-      std::cerr << "arbiter: no component has " + input.name +
-                       " open, which the model connects to " + rules::enumerate(connected) +
-                       ", so that nothing is delivered there\n";
+  // What became of the last sample at an input port that the model connects to this source.
+  [[nodiscard]] rules::PortOutcome outcome_at(const std::string& port) const {
+    if (!last_) return {false, {}, "?"};
+    switch (last_->at(port)) {
+      case Fate::accepted:
+        return {true, {}};
+      case Fate::discarded:
+        return {};
+      case Fate::refused:
+        return {false, {}, "refused"};
+      case Fate::blind:
+        return {false, {}, "blind"};
+      case Fate::none:
+        break;
     }
+    return {false, {}, "not open"};
   }
 
  private:
-  // The daemon is not asked more often, and does not hold up the trace for longer.
-  static constexpr shm::Nanoseconds kLookAgain = 1'000'000'000;
-  static constexpr std::chrono::milliseconds kPatience{100};
-
-  static const wire::ConnectionStatus* connection_of(const wire::InputStatus& input,
-                                                     const std::string& source) {
-    const auto found = std::find_if(input.connections.begin(), input.connections.end(),
-                                    [&](const auto& each) { return each.source == source; });
-    return found == input.connections.end() ? nullptr : &*found;
+  static Tap<> tap_of(Node& node, const std::string& name) {
+    TapOptions options;
+    options.max_held = 0;
+    options.may_wait = false;
+    return node.tap(name, options);
   }
 
-  [[nodiscard]] std::uint32_t open_inputs_of(const std::string& source) const {
-    return static_cast<std::uint32_t>(std::count_if(
-        status_.inputs.begin(), status_.inputs.end(),
-        [&](const auto& input) { return input.open && connection_of(input, source) != nullptr; }));
-  }
-
-  const wire::Caller caller_;
-  wire::Status status_;
-  std::map<std::string, std::uint32_t> met_;  // by source: at its last arrival
-  bool is_stale_ = false;
-  shm::Nanoseconds next_look_ = 0;
+  OutputPort<std::uint64_t> output_;
+  Tap<> tap_;
+  std::optional<TapEvent<>> last_;  // nothing: the tap has told nothing of the last sample
 };
 
 class Player {
  public:
   Player(const PlayOptions& options, const std::vector<rules::TraceEvent>& events)
-      : options_(options),
-        node_("arbiter-play", node_options(options.instance)),
-        played_ports_(options.instance) {
+      : options_(options), node_("arbiter-play", node_options(options.instance)) {
     for (const auto& event : events) {
-      if (event.kind == rules::TraceKind::kTick || outputs_.count(event.source) != 0) continue;
-      outputs_.emplace(event.source, node_.output_port<std::uint64_t>(event.source))
-          .first->second.require_replay();
+      if (event.kind == rules::TraceKind::kTick || sources_.count(event.source) != 0) continue;
+      sources_.try_emplace(event.source, node_, event.source);
     }
     instance_ = watch_instance("play", options.instance);  // which sees what has been opened
   }
@@ -138,18 +114,28 @@ class Player {
 
   void note_unknown_sources() const {
     const auto table = instance_->memory()->tables().snapshot().table;
-    for (const auto& [name, output] : outputs_) {
+    for (const auto& [name, played] : sources_) {
       const auto source = instance_->find_source(name);
       if (source && table.knows_source(*source)) continue;
       std::cerr << "arbiter: note: the daemon's model does not know " << name << '\n';
     }
   }
 
-  void note_what_is_not_open() {
-    played_ports_.look();
-    std::set<std::string> sources;
-    for (const auto& [name, output] : outputs_) sources.insert(name);
-    played_ports_.say_what_is_not_open(sources);
+  // Notices name the ports that refuse the sources.
+  void note_what_is_not_open() const {
+    const wire::Status status = instance_->status();
+    for (const wire::InputStatus& input : status.inputs) {
+      if (input.open) continue;
+      std::set<std::string> connected;
+      for (const auto& connection : input.connections) {
+        if (sources_.count(connection.source) != 0) connected.insert(connection.source);
+      }
+      if (connected.empty()) continue;
+      std::cerr << "arbiter: no component has " + input.name +
+                       " open, which the model connects to " +
+                       rules::enumerate({connected.begin(), connected.end()}) +
+                       ", so that nothing is delivered there\n";
+    }
   }
 
   // False: interrupted.
@@ -178,71 +164,58 @@ class Player {
   }
 
   void play(const rules::TraceEvent& event, shm::Nanoseconds at) {
+    const Time time{std::chrono::nanoseconds(at)};
     if (event.kind == rules::TraceKind::kArrival) {
-      ++counter_;
-      const Outcome outcome =
-          outputs_.at(event.source).publish_at(Time(std::chrono::nanoseconds(at)), counter_);
-      played_ports_.note_arrival(event.source,
-                                 outcome.delivered + outcome.discarded + outcome.refused);
+      sources_.at(event.source).publish_at(time, ++counter_);
     } else if (event.kind == rules::TraceKind::kDeactivation) {
-      outputs_.at(event.source).deactivate_at(Time(std::chrono::nanoseconds(at)));
+      sources_.at(event.source).deactivate_at(time);
     }
     instance_->update();
-    for (const auto& [name, port] : ports_of(event)) {
-      rules::PortOutcome outcome = outcome_at(port, event, at);
-      if (is_connected(event, port))
-        outcome.hindrance = played_ports_.hindrance(event.source, name);
+    const auto table = instance_->memory()->tables().snapshot().table;
+    const auto own = instance_->find_source(event.source);
+    for (const auto& [name, port] : ports_of(event, table)) {
+      const bool is_connected = own && table.find(*own, port) != shm::kNone;
+      rules::PortOutcome outcome;
+      if (event.kind == rules::TraceKind::kArrival && is_connected) {
+        outcome = sources_.at(event.source).outcome_at(name);
+      }
+      outcome.winner = winner_at(port, at);
       rules::write_outcome(std::cout, {event, name, std::move(outcome)});
     }
   }
 
   // In byte order of their names.
-  [[nodiscard]] std::map<std::string, shm::PortId> ports_of(const rules::TraceEvent& event) const {
-    const auto table = instance_->memory()->tables().snapshot().table;
-    std::set<shm::PortId> concerned;
-    const bool is_arrival = event.kind == rules::TraceKind::kArrival;
-    if (const auto source = instance_->find_source(event.source); is_arrival && source) {
-      const auto ports = table.ports_concerned(*source);
-      for (shm::Word i = 0; i < ports.count; ++i) concerned.insert(ports[i]);
-    }
+  [[nodiscard]] std::map<std::string, shm::PortId> ports_of(const rules::TraceEvent& event,
+                                                            const shm::TableView& table) const {
     std::map<std::string, shm::PortId> result;
-    for (const auto& [port, name] : instance_->port_names()) {
-      if (is_arrival ? concerned.count(port) != 0 : table.is_arbitrated(port)) result[name] = port;
+    const auto& names = instance_->port_names();
+    if (event.kind != rules::TraceKind::kArrival) {
+      for (const auto& [port, name] : names) {
+        if (table.is_arbitrated(port)) result[name] = port;
+      }
+    } else if (const auto source = instance_->find_source(event.source)) {
+      const auto ports = table.ports_concerned(*source);
+      for (shm::Word i = 0; i < ports.count; ++i) {
+        const auto named = names.find(ports[i]);
+        if (named != names.end()) result[named->second] = named->first;
+      }
     }
     return result;
   }
 
-  // By the live tables and activities: who wins, whether or not a component has the port open.
-  [[nodiscard]] rules::PortOutcome outcome_at(shm::PortId port, const rules::TraceEvent& event,
-                                              shm::Nanoseconds at) const {
+  // By the live tables and activities, whether or not a component has the port open.
+  [[nodiscard]] std::string winner_at(shm::PortId port, shm::Nanoseconds at) const {
     const shm::DecisionMemory& memory = *instance_->memory();
     watch::Picture picture = watch::take_picture(memory, watch::sources_at(port));
     picture.now = at;
-    const shm::TableView& table = picture.snapshot.table;
-    const auto is_active = [&](shm::SourceId source) { return picture.is_active(source); };
-    const shm::SourceId winner = shm::selected_at(table, port, is_active).source;
-    rules::PortOutcome outcome;
-    if (winner != shm::kNone) outcome.winner = memory.source_name(winner);
-    if (event.kind != rules::TraceKind::kArrival) return outcome;
-    const auto own = instance_->find_source(event.source);
-    outcome.delivered = own && table.find(*own, port) != shm::kNone &&
-                        (winner == *own || !table.is_arbitrated(port));
-    return outcome;
-  }
-
-  // An arrival, by the model in force.
-  [[nodiscard]] bool is_connected(const rules::TraceEvent& event, shm::PortId port) const {
-    if (event.kind != rules::TraceKind::kArrival) return false;
-    const auto own = instance_->find_source(event.source);
-    const auto table = instance_->memory()->tables().snapshot().table;
-    return own && table.find(*own, port) != shm::kNone;
+    const shm::SourceId winner = picture.winner_at(port);
+    return winner == shm::kNone ? std::string() : memory.source_name(winner);
   }
 
   const PlayOptions& options_;
   Node node_;
-  std::map<std::string, OutputPort<std::uint64_t>> outputs_;
+  std::map<std::string, PlayedSource> sources_;
   std::shared_ptr<watch::Instance> instance_;
-  PlayedPorts played_ports_;
   std::map<std::string, shm::Nanoseconds> deactivated_;  // when last
   shm::Nanoseconds last_ = 0;                            // time of the last event
   std::uint64_t counter_ = 0;
@@ -278,9 +251,11 @@ void add_play(CLI::App& app, int& exit_code) {
   add_instance_option(*verb, options->instance);
   verb->footer(
       "Example:\n  arbiter play trace.csv --speed 2\n\n"
-      "Beside delivered and discarded, as of arbiter simulate, the decision may be `not open`: no "
-      "component\nhas the input port open; or `refused`: the connection is, as where the types "
-      "differ.\n\n"
+      "The decision says what became of the sample, which play learns from a tap of each source: "
+      "the policy\nmust allow `replay` and `tap` of them. Beside delivered and discarded it may "
+      "be: "
+      "`not open`, no\ncomponent has the input port open; `refused`, its queue is full, or the "
+      "types differ; `blind`, no\ndecision was taken; `?`, there was no memory for the tap.\n\n"
       "Exit codes: 0 all published; 1 no daemon, or the trace has errors; 2 wrong use, or a file "
       "that "
       "cannot\nbe read; 130 stopped by Ctrl-C before the end (143 by SIGTERM)");

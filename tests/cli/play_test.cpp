@@ -69,6 +69,35 @@ TEST(Play, SaysOfAPortThatNobodyHasOpenThatNothingIsDelivered) {
             "1,/low,/p,-,-\n1,/low,/r,-,-\n");
 }
 
+TEST(Play, SaysOfAFullQueueThatItRefusesAndWhere) {
+  Daemon daemon(kPlayedModel);
+  Node node("test");
+  InputPortOptions options;
+  options.depth = 1;
+  options.when_full = WhenFull::refuse_new;
+  auto p = node.input_port("/p", options);
+  auto r = node.input_port("/r");
+  const TemporaryDirectory files;
+  const auto played =
+      arbiter({"play", files.write("trace.csv", "t_ns,source\n0,/low\n1000,/low\n2000,/high\n")});
+  EXPECT_EQ(played.exit_code, 0) << played.err;
+  EXPECT_EQ(played.out,
+            "t_ns,source,destination,decision,winner\n"
+            "0,/low,/p,delivered,/low\n0,/low,/r,delivered,/low\n"
+            "1000,/low,/p,refused,/low\n1000,/low,/r,delivered,/low\n"
+            "2000,/high,/p,delivered,/high\n2000,/high,/r,delivered,/high\n");
+}
+
+TEST(Play, NeedsThePolicysTap) {
+  const TemporaryDirectory files;
+  const auto policy = files.write("policy", "deny everyone tap *\nallow everyone all\n");
+  Daemon daemon(kPlayedModel, {.arguments = {"--policy", policy}});
+  const auto played = arbiter({"play", files.write("trace.csv", "t_ns,source\n0,/low\n")});
+  EXPECT_EQ(played.exit_code, 1);
+  EXPECT_THAT(played.err, HasSubstr("may not tap"));
+  EXPECT_EQ(played.out, "");
+}
+
 TEST(Play, NoticesThatAComponentOpensAPort) {
   Daemon daemon(kPlayedModel);
   const TemporaryDirectory files;
