@@ -42,10 +42,15 @@ int echo_component(const EchoOptions& options, const shm::FileDescriptor& interr
 shm::Nanoseconds end_of_echo(const EchoOptions& options, shm::Nanoseconds started);
 // Of the node that opens what echo watches. The daemon has answered just before: it is there.
 NodeOptions echo_node_options(const EchoOptions& options);
-// Calls look() when `fd` is readable, and ten times a second, until that returns false, the time is
+// What a look has left. With kMore nobody rings for it.
+enum class Looked : std::uint8_t { kNothing, kMore, kEnough };
+// In one look: a port that is never silent must not keep echo from hearing Ctrl-C.
+inline constexpr int kMostOfLook = 1024;
+// Calls look() when fd() is readable, and ten times a second, until that says kEnough, the time is
 // over, or `interrupts` is readable.
-void echo_while(const EchoOptions& options, int fd, const shm::FileDescriptor& interrupts,
-                EchoNews& news, const std::function<bool()>& look);
+void echo_while(const EchoOptions& options, const std::function<int()>& fd,
+                const shm::FileDescriptor& interrupts, EchoNews& news,
+                const std::function<Looked()>& look);
 
 // Whether PORT is an output port or an input port, as far as the daemon knows; else by the end of
 // its name. Says on standard error if nobody has named it, or has it open. `instance`: null where

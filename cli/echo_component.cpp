@@ -3,6 +3,8 @@
 #include <exception>
 #include <iostream>
 #include <map>
+#include <memory>
+#include <optional>
 #include <string>
 
 #include <nlohmann/json.hpp>
@@ -21,33 +23,47 @@ constexpr std::uint32_t kDepth = 1024;
 class Echo {
  public:
   Echo(const EchoOptions& options, EchoNews& news, const shm::FileDescriptor& interrupts)
-      : options_(options),
-        news_(news),
-        interrupts_(interrupts),
-        node_("arbiter-echo", echo_node_options(options)),
-        in_(open(node_, options.port)),
-        started_(shm::monotonic_now()) {}
+      : options_(options), news_(news), interrupts_(interrupts), started_(shm::monotonic_now()) {
+    open();
+  }
 
   int run() {
-    echo_while(options_, in_.fd(), interrupts_, news_, [this] { return print_all(); });
+    echo_while(
+        options_, [this] { return in_->fd(); }, interrupts_, news_, [this] { return look(); });
     return finish();
   }
 
  private:
-  // False: that was enough.
-  bool print_all() {
-    while (auto sample = in_.take()) {
+  Looked look() {
+    for (int i = 0; i < kMostOfLook; ++i) {
+      const auto sample = in_->take();
+      if (!sample) {
+        open_beside_other_memory();
+        return Looked::kNothing;
+      }
       print(*sample);
-      if (++samples_ == options_.count || !std::cout) return false;
+      if (++samples_ == options_.count || !std::cout) return Looked::kEnough;
     }
-    return true;
+    return Looked::kMore;
   }
 
-  static InputPort<void> open(Node& node, const std::string& port) {
+  void open() {
     InputPortOptions options;
     options.keep = true;
     options.depth = kDepth;
-    return node.input_port(port, options);
+    node_.emplace("arbiter-echo", echo_node_options(options_));
+    in_.emplace(node_->input_port(options_.port, options));
+    if (news_.instance() != nullptr) memory_ = news_.instance()->memory();
+  }
+
+  // A daemon that came without the memory of the last one does not take back a node that has ports.
+  void open_beside_other_memory() {
+    if (news_.instance() == nullptr || news_.instance()->memory() == memory_) return;
+    std::cerr << "arbiter: it came without the memory of the last one; arbiter opens "
+              << options_.port << " again\n";
+    in_.reset();
+    node_.reset();
+    open();
   }
 
   void print(const Sample<void>& sample) {
@@ -102,8 +118,9 @@ class Echo {
   EchoNews& news_;
   const shm::FileDescriptor& interrupts_;
   EchoHosts hosts_{options_.instance};
-  Node node_;
-  InputPort<void> in_;
+  std::shared_ptr<const shm::DecisionMemory> memory_;  // by which the port is open
+  std::optional<Node> node_;
+  std::optional<InputPort<void>> in_;
   const shm::Nanoseconds started_;
   std::uint64_t samples_ = 0;
   std::map<std::string, std::uint64_t> by_source_;

@@ -28,17 +28,20 @@ NodeOptions echo_node_options(const EchoOptions& options) {
   return node;
 }
 
-void echo_while(const EchoOptions& options, int fd, const shm::FileDescriptor& interrupts,
-                EchoNews& news, const std::function<bool()>& look) {
+void echo_while(const EchoOptions& options, const std::function<int()>& fd,
+                const shm::FileDescriptor& interrupts, EchoNews& news,
+                const std::function<Looked()>& look) {
   const shm::Nanoseconds end = end_of_echo(options, shm::monotonic_now());
   // Whoever reads this may go while nothing arrives.
-  pollfd ready[] = {{fd, POLLIN, 0}, {interrupts.get(), POLLIN, 0}, {STDOUT_FILENO, 0, 0}};
-  while (look()) {
+  pollfd ready[] = {{-1, POLLIN, 0}, {interrupts.get(), POLLIN, 0}, {STDOUT_FILENO, 0, 0}};
+  for (Looked looked = look(); looked != Looked::kEnough; looked = look()) {
     std::cout.flush();
     news.tell();
-    const shm::Nanoseconds left = std::min(end - shm::monotonic_now(), kEchoLookInterval);
+    shm::Nanoseconds left = std::min(end - shm::monotonic_now(), kEchoLookInterval);
     if (left <= 0) return;
+    if (looked == Looked::kMore) left = 0;
     const timespec span{left / 1'000'000'000, left % 1'000'000'000};
+    ready[0].fd = fd();
     ppoll(ready, 3, &span, nullptr);
     if (ready[1].revents != 0) return;
     if ((ready[2].revents & (POLLERR | POLLHUP)) != 0) std::cout.setstate(std::ios::badbit);

@@ -107,11 +107,12 @@ class RateEcho {
     const shm::Nanoseconds started = shm::monotonic_now();
     const shm::Nanoseconds end = end_of_echo(options_, started);
     shm::Nanoseconds line = started;
+    Looked looked = Looked::kNothing;
     while (std::cout && !has_reader_gone()) {
       const shm::Nanoseconds next = std::min(line + kSecond, end);
       const bool is_interrupted =
-          sleep_until(std::min(shm::monotonic_now() + kLookInterval, next), interrupts_);
-      look();
+          sleep_until(std::min(shm::monotonic_now() + pause_after(looked), next), interrupts_);
+      looked = look();
       news_.tell();
       const shm::Nanoseconds now = shm::monotonic_now();
       if (now < next && !is_interrupted) continue;
@@ -135,8 +136,14 @@ class RateEcho {
     return options;
   }
 
-  void look() {
-    while (const auto event = tap_.take()) {
+  static shm::Nanoseconds pause_after(Looked looked) {
+    return looked == Looked::kMore ? 0 : kLookInterval;
+  }
+
+  Looked look() {
+    for (int i = 0; i < kMostOfLook; ++i) {
+      const auto event = tap_.take();
+      if (!event) return Looked::kNothing;
       if (event->count() != 0) continue;  // of what has been counted already
       Rate& rate = rates_[event->source()];
       if (event->lost() != 0) rate.forget_last();
@@ -145,6 +152,7 @@ class RateEcho {
           !is_input_ || options_.losers || event->at(options_.port) == Fate::accepted;
       if (is_counted) rate.note(event->time().time_since_epoch().count(), event->size());
     }
+    return Looked::kMore;
   }
 
   void print(double seconds) {

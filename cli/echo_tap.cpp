@@ -70,19 +70,21 @@ class TapEcho {
         started_(shm::monotonic_now()) {}
 
   int run() {
-    echo_while(options_, tap_.fd(), interrupts_, news_, [this] { return print_all(); });
+    echo_while(
+        options_, [this] { return tap_.fd(); }, interrupts_, news_, [this] { return look(); });
     return finish();
   }
 
  private:
-  // False: that was enough.
-  bool print_all() {
-    while (const auto event = tap_.take()) {
+  Looked look() {
+    for (int i = 0; i < kMostOfLook; ++i) {
+      const auto event = tap_.take();
+      if (!event) return Looked::kNothing;
       lost_ += event->lost();
       if (is_shown(*event)) print(*event);
-      if ((options_.count != 0 && printed_ == options_.count) || !std::cout) return false;
+      if ((options_.count != 0 && printed_ == options_.count) || !std::cout) return Looked::kEnough;
     }
-    return true;
+    return Looked::kMore;
   }
 
   static TapOptions tap_options(TapOf of) {

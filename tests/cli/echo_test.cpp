@@ -271,6 +271,29 @@ TEST(Echo, SaysWhatBecomesOfTheDaemonAndOfThePortInAnotherModel) {
   }
 }
 
+TEST(Echo, AsAComponentGoesOnBesideADaemonThatHasOtherMemory) {
+  Daemon daemon(kOverrideModel);
+  const std::string path = daemon.directory() + "/out";
+  const shm::FileDescriptor out(::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600));
+  const ChildProcess program({ARBITER_PROGRAMS "/arbiter", "echo", "/p", "--as-component"}, {},
+                             {-1, out.get(), out.get()});
+  const auto has = [&](const char* text) {
+    return content_of(path).find(text) != std::string::npos;
+  };
+  await([&] { return daemon.input("/p")["open"] == true; });
+  daemon.kill();
+  daemon.lose_state();
+  daemon.restart();
+  await(
+      [&] { return has("it came without the memory of the last one; arbiter opens /p again\n"); });
+  Node node("test");
+  auto low = node.output_port<int>("/low");
+  await([&] {
+    low.publish(1);
+    return has("/low  #");
+  });
+}
+
 TEST(Echo, SaysSoOfADaemonThatDidNotAnswerAtFirst) {
   Daemon daemon(kOverrideModel);
   const std::string path = daemon.directory() + "/err";
