@@ -18,6 +18,7 @@
 #include "recorder/replayer.hpp"
 #include "rules/model/quantifiers.hpp"
 #include "rules/text/names.hpp"
+#include "shm/utf8.hpp"
 
 namespace arbiter::cli {
 namespace {
@@ -92,7 +93,7 @@ int replay(const ReplayVerb& verb) {
   options.watch = line.watch("looking for what the recording has");
   options.say = [&line](const std::string& text) {
     line.clear();
-    std::cerr << "arbiter: " + text + '\n';
+    std::cerr << "arbiter: " + shm::printable(text) + '\n';
   };
   const auto replayer = replayer_for(verb, options, line);
   line.clear();

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <chrono>
+#include <filesystem>
 #include <map>
 #include <optional>
 
@@ -183,6 +184,17 @@ TEST_F(Replay, RefusesWhatWouldNotEnd) {
     EXPECT_EQ(result.exit_code, 1) << result.err;
     EXPECT_THAT(result.err, HasSubstr("would take more than 70 years at this speed"));
   }
+}
+
+TEST_F(Replay, PrintsNothingThatATerminalObeys) {
+  const std::string file = record();
+  const std::string red = file + "\x1b[31m";
+  std::filesystem::copy(file, red);
+  std::filesystem::resize_file(red, std::filesystem::file_size(red) - 20);
+  const auto result = arbiter({"replay", red});
+  EXPECT_THAT(result.err, HasSubstr(file + "\\x1b[31m: "));
+  EXPECT_THAT(result.err, HasSubstr("; what comes before is published\n"));
+  EXPECT_THAT(result.err, testing::Not(HasSubstr("\x1b[31m")));
 }
 
 TEST_F(Replay, NeedsItsPorts) {
