@@ -192,6 +192,11 @@ const PastModel& ModelChanges::past_model(std::uint64_t asked) const {
     if (oldest == nullptr) {
       throw std::runtime_error("there is no model to go back to: none has been in force");
     }
+    const PastModel* const first = history_.find(oldest->content);
+    if (first != nullptr && first->how == kInherited) {
+      throw std::runtime_error(
+          "there is no model to go back to: this daemon keeps none from before its start");
+    }
     const std::string content = std::to_string(oldest->content);
     const std::string is_oldest = oldest->generation == oldest->content
                                       ? "model " + content + " is the oldest that is kept"
@@ -206,8 +211,9 @@ const PastModel& ModelChanges::past_model(std::uint64_t asked) const {
   }
   if (past->model == nullptr) {
     throw std::runtime_error("model " + std::to_string(past->generation) +
-                             " is not kept any longer, or was another daemon's; only its name is "
-                             "known");
+                             (past->how == kInherited ? " was in force before this daemon started"
+                                                      : " is not kept any longer") +
+                             "; only its name is known");
   }
   return *past;
 }

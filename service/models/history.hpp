@@ -13,6 +13,9 @@
 
 namespace arbiter::service {
 
+// How a model came into force that a predecessor had in force.
+inline constexpr char kInherited[] = "takeover";
+
 // One that came into force.
 struct PastModel {
   std::uint64_t generation = 0;

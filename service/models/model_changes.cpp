@@ -58,7 +58,7 @@ ModelChanges::ModelChanges(Options options, const Parts& parts, std::function<vo
 void ModelChanges::start(bool is_fresh) {
   const auto inherited = board_.in_force().generation;
   if (inherited != 0) {
-    history_.add({inherited, 0, board_.name(), {}, calendar_ms(), "takeover", {}, {}, nullptr});
+    history_.add({inherited, 0, board_.name(), {}, calendar_ms(), kInherited, {}, {}, nullptr});
   }
   if (is_fresh && !not_read_at_start_.empty()) {
     throw BadModel("not started: " + not_read_at_start_);

@@ -29,7 +29,7 @@ TEST_F(ChangingModels, TheNextDaemonGoesOnWithTheModelOfThatName) {
   EXPECT_EQ(history[1]["how"], "takeover");
   EXPECT_EQ(history[1]["name"], "other");
   expect_refusal(arbiter({"rollback"}),
-                 "model 2 is not kept any longer, or was another daemon's; only its name is known");
+                 "model 2 was in force before this daemon started; only its name is known");
 }
 
 TEST_F(ChangingModels, TheNextDaemonThatLacksTheModelBeginsWithItsFirst) {
@@ -83,6 +83,8 @@ TEST_F(ChangingModels, OfABrokenFileTheModelInForceStaysWithTheNextDaemon) {
   daemon.restart();
   EXPECT_EQ(daemon.generation(), 1u);
   EXPECT_EQ(name_in_force(), "default");
+  expect_refusal(arbiter({"rollback"}),
+                 "there is no model to go back to: this daemon keeps none from before its start");
   EXPECT_EQ(a.publish(Number{1}).delivered, 1u);
   EXPECT_EQ(take_from(in), 1);
   {
