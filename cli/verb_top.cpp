@@ -12,6 +12,7 @@
 #include <optional>
 #include <set>
 #include <sstream>
+#include <stop_token>
 #include <string>
 #include <utility>
 
@@ -29,6 +30,7 @@
 #include "top/screen.hpp"
 #include "top/tapper.hpp"
 #include "top/view.hpp"
+#include "watch/model_loader.hpp"
 
 namespace arbiter::cli {
 namespace {
@@ -57,16 +59,18 @@ watch::KeptPicture picture_of(const top::Frame& frame) {
 }
 
 std::string explain(const std::shared_ptr<watch::Instance>& instance,
-                    const top::WhyQuestion& question) {
+                    const std::shared_ptr<watch::ModelLoader>& models,
+                    const top::WhyQuestion& question, const std::stop_token& stop) {
   std::optional<watch::KeptPicture> kept;
   if (question.moment != nullptr) kept = picture_of(*question.moment);
   std::ostringstream text;
   for (const std::string& port : question.ports) {
+    if (stop.stop_requested()) break;
     if (text.tellp() > 0) text << '\n';
     WhyOptions options;
     options.port = port;
     options.source = question.source;
-    write_why(text, options, instance, kept ? &*kept : nullptr);
+    write_why(text, options, instance, kept ? &*kept : nullptr, nullptr, models);
   }
   if (kept) {
     text << "\nWho wins, and what is active, is of the moment shown, and \"ago\" counts from it. "

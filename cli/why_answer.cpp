@@ -47,7 +47,11 @@ WhyAnswer::WhyAnswer(const WhyOptions& options, const watch::Port& port, Look lo
       tenure_(
           rules::tenure_of(look_.table(), port.id(), look_.winner,
                            {look_.sources.now(), port.model().since(port.name()),
-                            [this](shm::SourceId source) { return look_.picture.words.at(source); },
+                            [this](shm::SourceId source) {
+                              const auto& words = look_.picture.words;
+                              const auto word = words.find(source);  // none: it is torn
+                              return word == words.end() ? shm::kNeverActive : word->second;
+                            },
                             [this](shm::SourceId source) {
                               return look_.sources.state(port_.source_name(source)).arrived_by();
                             }})),
@@ -212,8 +216,8 @@ void WhyAnswer::write_json() const {
 
 void write_why(std::ostream& out, const WhyOptions& options,
                const std::shared_ptr<watch::Instance>& instance, const watch::KeptPicture* kept,
-               const wire::HostsDocument* hosts) {
-  watch::Port port(instance, options.port);
+               const wire::HostsDocument* hosts, std::shared_ptr<watch::ModelLoader> models) {
+  watch::Port port(instance, options.port, std::move(models));
   for (;;) {
     Look look = kept == nullptr ? port.look() : port.look_back(*kept);
     auto explanation = port.explain(look);
@@ -223,8 +227,10 @@ void write_why(std::ostream& out, const WhyOptions& options,
     if (kept == nullptr) watch::add_gaps(port, look, status);
     watch::Fates fates;
     if (hosts != nullptr) fates = fates_elsewhere(options, status, *hosts);
+    const shm::TableSnapshot snapshot = look.picture.snapshot;
     const WhyAnswer answer(options, port, std::move(look), std::move(*explanation), status,
                            std::move(fates), out);
+    if (!port.is_whole(snapshot)) continue;  // later models have its place
     answer.check_source();
     if (options.json) {
       answer.write_json();

@@ -72,10 +72,11 @@ class WhyAnswer {
 
 // The whole answer to `options`. Of activities, and of who wins, it says what the kept picture has,
 // if one is given; what the daemon's status knows is always of now. With `hosts` also what comes
-// from other hosts, or came. Throws as watch::Port does, and Error.
+// from other hosts, or came. `models`: as watch::Port has it. Throws as watch::Port does, and
+// Error.
 void write_why(std::ostream& out, const WhyOptions& options,
                const std::shared_ptr<watch::Instance>& instance,
-               const watch::KeptPicture* kept = nullptr,
-               const wire::HostsDocument* hosts = nullptr);
+               const watch::KeptPicture* kept = nullptr, const wire::HostsDocument* hosts = nullptr,
+               std::shared_ptr<watch::ModelLoader> models = nullptr);
 
 }  // namespace arbiter::cli

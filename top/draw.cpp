@@ -39,6 +39,15 @@ std::vector<Line> message(const std::string& text, Size size, Style style, Chars
   return lines;
 }
 
+// And blanks behind it, up to the edge.
+Line with_margin(const std::string& margin, Line line, std::size_t columns) {
+  line.spans.insert(line.spans.begin(), {margin, Style::kPlain});
+  std::size_t width = 0;
+  for (const Span& span : line.spans) width += columns_of(span.text);
+  if (width < columns) line.spans.push_back({std::string(columns - width, ' ')});
+  return line;
+}
+
 }  // namespace
 
 std::vector<Line> View::draw(Size size) {
@@ -102,17 +111,32 @@ std::array<std::size_t, kPanes> View::heights(const std::array<Table, kPanes>& t
   return result;
 }
 
+// So that the cursor is among them. Returns where the rows that are shown end.
+std::size_t View::scroll_to_cursor(Pane pane, const Table& table, std::size_t rows) {
+  find_selected(pane, table);
+  PaneState& state = panes_[static_cast<std::size_t>(pane)];
+  state.page = std::max<std::size_t>(rows - 1, 1);
+  const std::size_t most = table.rows.size() > state.page ? table.rows.size() - state.page : 0;
+  state.offset = std::min({state.offset, state.index, most});
+  if (state.index >= state.offset + state.page) state.offset = state.index - state.page + 1;
+  return std::min(state.offset + state.page, table.rows.size());
+}
+
+Line View::pane_header(Pane pane, const Table& table) const {
+  const PaneState& state = panes_[static_cast<std::size_t>(pane)];
+  const std::size_t none = table.columns.size();
+  const std::size_t sorted = pane == Pane::kTakeovers ? none : std::min(state.sorted, none - 1);
+  Line header = table.header(state.widths, sorted, state.is_descending, charset_);
+  for (Span& span : header.spans) span.style = pane == focus_ ? Style::kTitle : Style::kHeader;
+  return header;
+}
+
 std::vector<Line> View::draw_pane(Pane pane, Table table, Size size) {
   std::vector<Line> lines;
   if (size.rows == 0 || table.columns.empty()) return lines;
-  find_selected(pane, table);
+  const std::size_t end = scroll_to_cursor(pane, table, size.rows);
   PaneState& state = panes_[static_cast<std::size_t>(pane)];
-  state.page = std::max<std::size_t>(size.rows - 1, 1);
-  const std::size_t most = table.rows.size() > state.page ? table.rows.size() - state.page : 0;
-  state.offset = std::min(state.offset, std::min(state.index, most));
-  if (state.index >= state.offset + state.page) state.offset = state.index - state.page + 1;
-  const std::size_t end = std::min(state.offset + state.page, table.rows.size());
-  if (most != 0) {
+  if (end - state.offset < table.rows.size()) {
     table.columns[pane == Pane::kTakeovers ? 1 : 0].title +=
         " " + std::to_string(state.offset + 1) + "-" + std::to_string(end) + "/" +
         std::to_string(table.rows.size());
@@ -121,30 +145,21 @@ std::vector<Line> View::draw_pane(Pane pane, Table table, Size size) {
   const bool has_marks =
       size.columns > 16 && std::any_of(table.rows.begin(), table.rows.end(),
                                        [](const Row& row) { return row.is_marked; });
-  const std::size_t gutter = has_marks ? 3 : 1;
-  const std::size_t room = size.columns > gutter + 1 ? size.columns - gutter : 1;
-  state.widths = table.widths(room, charset_);
-  const auto& widths = state.widths;
-  const std::size_t none = table.columns.size();
-  const auto add = [&](Line line, bool has_cursor, bool is_tapped, bool is_selected) {
+  const auto margin = [&](bool has_cursor, bool is_tapped) {
     const std::string marks = has_marks ? (is_tapped ? "t " : "  ") : "";
-    line.spans.insert(line.spans.begin(), {(has_cursor ? ">" : " ") + marks, Style::kPlain});
-    line.is_selected = is_selected;
-    std::size_t width = 0;
-    for (const Span& span : line.spans) width += columns_of(span.text);
-    if (width < size.columns) line.spans.push_back({std::string(size.columns - width, ' ')});
-    lines.push_back(std::move(line));
+    return (has_cursor ? ">" : " ") + marks;
   };
+  const std::size_t gutter = margin(false, false).size();
+  state.widths = table.widths(size.columns > gutter + 1 ? size.columns - gutter : 1, charset_);
   const bool has_focus = pane == focus_;
-  const std::size_t sorted = pane == Pane::kTakeovers ? none : std::min(state.sorted, none - 1);
-  Line header = table.header(widths, sorted, state.is_descending, charset_);
-  for (Span& span : header.spans) span.style = has_focus ? Style::kTitle : Style::kHeader;
-  add(std::move(header), has_focus, false, false);
+  lines.push_back(with_margin(margin(has_focus, false), pane_header(pane, table), size.columns));
   for (std::size_t i = state.offset; i < end; ++i) {
     const bool is_selected = has_focus && i == state.index;
     const Row& row = table.rows[i];
-    add(table.line(row, widths, is_selected, charset_, &names_), is_selected, row.is_marked,
-        is_selected);
+    lines.push_back(with_margin(margin(is_selected, row.is_marked),
+                                table.line(row, state.widths, is_selected, charset_, &names_),
+                                size.columns));
+    lines.back().is_selected = is_selected;
   }
   if (table.rows.empty() && size.rows > 1) {
     lines.push_back(line_of(filter_.empty() ? "   none" : "   none that the filter shows",

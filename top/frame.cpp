@@ -100,11 +100,15 @@ std::string model_text(const wire::ModelStatus& model) {
 shm::Nanoseconds first_model_since(const StampedStatus& now) {
   const auto& history = now.status.history;
   if (history.size() != 1 || history.front().how != "start") return 0;
-  const auto since =
-      std::chrono::system_clock::time_point(std::chrono::milliseconds(history.front().since_ms));
-  const auto ago = std::chrono::duration_cast<std::chrono::nanoseconds>(now.wall - since);
-  // The calendar clock may have been set in between.
-  return std::clamp<shm::Nanoseconds>(now.at - ago.count(), 1, now.at);
+  constexpr shm::Nanoseconds kMillisecond = 1'000'000;
+  const shm::Nanoseconds wall =
+      std::chrono::duration_cast<std::chrono::nanoseconds>(now.wall.time_since_epoch()).count();
+  // The calendar clock may have been set in between, and the document may say anything.
+  const shm::Nanoseconds latest = std::max<shm::Nanoseconds>(wall, 0) / kMillisecond;
+  const shm::Nanoseconds since =
+      std::clamp<shm::Nanoseconds>(history.front().since_ms, 0, latest) * kMillisecond;
+  return std::clamp<shm::Nanoseconds>(now.at - std::max<shm::Nanoseconds>(wall - since, 0), 1,
+                                      now.at);
 }
 
 template <class Fact>

@@ -144,7 +144,7 @@ struct WhyQuestion {
   std::shared_ptr<const Frame> moment{};  // that the answer is to be of; null: now
   std::vector<std::string> seen{};        // what the asker knows already, a line for each port
 };
-struct WhyAnswer {
+struct WhyReply {
   WhyQuestion question;
   std::vector<std::string> lines;
 };

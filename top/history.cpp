@@ -10,7 +10,8 @@ constexpr std::size_t kMostBytes = std::size_t{32} << 20;
 
 std::size_t bytes_of(const Frame& frame) {
   return sizeof frame + frame.ports.size() * sizeof(PortState) +
-         frame.words.size() * sizeof(shm::ActivityWord);
+         frame.words.size() * sizeof(shm::ActivityWord) +
+         frame.slow_periods.size() * sizeof(shm::Nanoseconds);
 }
 
 }  // namespace

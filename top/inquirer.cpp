@@ -30,6 +30,7 @@ std::vector<std::string> lines_of(const std::string& text) {
 
 Inquirer::Inquirer(std::shared_ptr<watch::Instance> instance, ExplainWhy explain)
     : instance_(std::move(instance)),
+      models_(std::make_shared<watch::ModelLoader>(instance_)),
       explain_(std::move(explain)),
       bell_(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)) {
   if (!bell_) throw std::system_error(errno, std::generic_category(), "eventfd");
@@ -70,7 +71,7 @@ void Inquirer::run(const std::stop_token& stop) {
       question = std::exchange(question_, std::nullopt);
     }
     if (stop.stop_requested()) return;
-    if (question) answer(*question);
+    if (question) answer(*question, stop);
     if (std::chrono::steady_clock::now() < next) continue;
     take_census();
     next = std::chrono::steady_clock::now() + kCensusInterval;
@@ -103,14 +104,14 @@ void Inquirer::take_census() {
   });
 }
 
-void Inquirer::answer(const WhyQuestion& question) {
-  WhyAnswer answer{question, {}};
+void Inquirer::answer(const WhyQuestion& question, const std::stop_token& stop) {
+  WhyReply reply{question, {}};
   try {
-    answer.lines = lines_of(explain_(instance_, question));
+    reply.lines = lines_of(explain_(instance_, models_, question, stop));
   } catch (const std::exception& error) {
-    answer.lines = {error.what()};
+    reply.lines = {error.what()};
   }
-  tell([&](News& news) { news.why = std::move(answer); });
+  tell([&](News& news) { news.why = std::move(reply); });
 }
 
 void Inquirer::tell(const std::function<void(News&)>& write) {

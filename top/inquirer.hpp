@@ -17,12 +17,15 @@
 #include "shm/file_descriptor.hpp"
 #include "top/frame.hpp"
 #include "watch/instance.hpp"
+#include "watch/model_loader.hpp"
 
 namespace arbiter::top {
 
-// Runs on the inquirer's thread; what it throws is the answer.
-using ExplainWhy =
-    std::function<std::string(const std::shared_ptr<watch::Instance>&, const WhyQuestion&)>;
+// Runs on the inquirer's thread; what it throws is the answer. If it is asked to stop, nobody reads
+// the answer any more.
+using ExplainWhy = std::function<std::string(const std::shared_ptr<watch::Instance>&,
+                                             const std::shared_ptr<watch::ModelLoader>&,
+                                             const WhyQuestion&, const std::stop_token&)>;
 
 class Inquirer {
  public:
@@ -30,7 +33,8 @@ class Inquirer {
   Inquirer(std::shared_ptr<watch::Instance> instance, ExplainWhy explain);
   Inquirer(const Inquirer&) = delete;
   Inquirer& operator=(const Inquirer&) = delete;
-  // Waits for a question that is under way: a second at most, where the daemon does not answer.
+  // Asks the question that is under way to stop, and waits until it has: a second at most where the
+  // daemon does not answer, as long as one port takes where the model is large.
   ~Inquirer();
 
   // Any thread.
@@ -41,7 +45,7 @@ class Inquirer {
   void ask(WhyQuestion question);
   struct News {
     std::shared_ptr<const Census> census;  // null: none since the last time
-    std::optional<WhyAnswer> why;
+    std::optional<WhyReply> why;
     std::string problem;     // why there is no census now; "": there is one
     bool is_silent = false;  // for the daemon does not answer
   };
@@ -50,10 +54,11 @@ class Inquirer {
  private:
   void run(const std::stop_token& stop);
   void take_census();
-  void answer(const WhyQuestion& question);
+  void answer(const WhyQuestion& question, const std::stop_token& stop);
   void tell(const std::function<void(News&)>& write);
 
   const std::shared_ptr<watch::Instance> instance_;
+  const std::shared_ptr<watch::ModelLoader> models_;  // keeps the model for the next question
   const ExplainWhy explain_;
   shm::FileDescriptor bell_;
   std::optional<StampedStatus> last_;  // the thread's

@@ -1,6 +1,7 @@
 #include "top/overlay.hpp"
 
 #include <algorithm>
+#include <string_view>
 
 #include "shm/utf8.hpp"
 
@@ -10,11 +11,13 @@ namespace {
 // Bytes of the first so many columns; at least one character.
 std::size_t bytes_of(std::string_view text, std::size_t columns) {
   std::size_t bytes = 0;
+  std::size_t used = 0;
   while (bytes < text.size()) {
-    const std::size_t next =
-        bytes + std::max<std::size_t>(shm::decode_utf8(text.substr(bytes)).length, 1);
-    if (bytes != 0 && columns_of(text.substr(0, next)) > columns) break;
-    bytes = next;
+    const std::size_t length =
+        std::max<std::size_t>(shm::decode_utf8(text.substr(bytes)).length, 1);
+    used += columns_of(text.substr(bytes, length));
+    if (bytes != 0 && used > columns) break;
+    bytes += length;
   }
   return bytes;
 }
@@ -37,20 +40,23 @@ Indent indent_of(const std::string& line, std::size_t columns) {
 }  // namespace
 
 std::vector<std::string> broken(const std::string& line, std::size_t columns, Charset charset) {
-  std::string rest = safe(line, charset);
-  auto [begin, indent] = indent_of(rest, columns);
+  const std::string whole = safe(line, charset);
+  auto [begin, indent] = indent_of(whole, columns);
+  std::string_view rest = whole;
+  std::string margin;  // before the rest
   std::vector<std::string> result;
-  while (columns_of(rest) > columns) {
-    std::size_t end = bytes_of(rest, columns);
+  for (std::size_t end = 0; (end = bytes_of(rest, columns - margin.size())) < rest.size();) {
     const std::size_t blank = rest.rfind(' ', end);
-    const bool has_words = blank != std::string::npos && blank > begin;
+    const bool has_words = blank != std::string_view::npos && blank > begin;
     if (has_words) end = blank;
-    result.push_back(rest.substr(0, end));
-    rest = std::string(indent, ' ') + rest.substr(has_words ? end + 1 : end);
-    begin = indent;
+    result.push_back(margin + std::string(rest.substr(0, end)));
+    rest.remove_prefix(has_words ? end + 1 : end);
+    margin.assign(indent, ' ');
+    begin = 0;
     if (columns <= indent + 1) break;
   }
-  result.push_back(fit(rest, std::min(columns_of(rest), columns), Align::kLeft, charset));
+  margin += rest;
+  result.push_back(fit(margin, std::min(columns_of(margin), columns), Align::kLeft, charset));
   return result;
 }
 
@@ -60,11 +66,20 @@ void Overlay::scroll(std::ptrdiff_t by) {
       std::clamp<std::ptrdiff_t>(to, 0, static_cast<std::ptrdiff_t>(most_)));
 }
 
-std::vector<Line> Overlay::draw(std::size_t width, std::size_t height, Charset charset) {
-  std::vector<std::string> all;
+// Anew only where the screen is another: an answer may be long, and is drawn ten times a second.
+void Overlay::break_lines(std::size_t width, Charset charset) {
+  const std::pair wanted(width, charset);
+  if (broken_for_ == wanted) return;
+  broken_for_ = wanted;
+  parts_.clear();
   for (const std::string& each : lines_) {
-    for (std::string& part : broken(each, width, charset)) all.push_back(std::move(part));
+    for (std::string& part : broken(each, width, charset)) parts_.push_back(std::move(part));
   }
+}
+
+std::vector<Line> Overlay::draw(std::size_t width, std::size_t height, Charset charset) {
+  break_lines(width, charset);
+  const std::vector<std::string>& all = parts_;
   page_ = std::max<std::size_t>(height, 2) - 1;
   most_ = all.size() > page_ ? all.size() - page_ : 0;
   offset_ = std::min(offset_, most_);

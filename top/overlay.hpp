@@ -2,7 +2,9 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "top/line.hpp"
@@ -20,8 +22,12 @@ class Overlay {
   [[nodiscard]] std::size_t page() const { return page_; }
 
  private:
-  std::string title_;
-  std::vector<std::string> lines_;
+  void break_lines(std::size_t width, Charset charset);
+
+  const std::string title_;
+  const std::vector<std::string> lines_;
+  std::vector<std::string> parts_;  // of the lines, broken for a screen of this width
+  std::optional<std::pair<std::size_t, Charset>> broken_for_;
   std::size_t offset_ = 0;
   std::size_t most_ = 0;  // that it can be scrolled to
   std::size_t page_ = 1;

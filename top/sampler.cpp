@@ -79,10 +79,8 @@ shm::Nanoseconds Sampler::look() {
   before_ = std::exchange(last_, std::move(picture));
   wall_ = std::chrono::system_clock::now();
   if (collect_) {
-    for (Accepted& each : collect_()) {
-      if (each.is_sample) note_arrival(each);
-      accepted_.push_back(std::move(each));
-    }
+    std::vector<Accepted> told = collect_();
+    arrivals_.add(std::move(told), shm::monotonic_now());
   }
   for (const auto& [source, word] : last_.words) {
     paces_[source].look(word, last_.snapshot.table.timeout(source), last_.now);
@@ -110,7 +108,7 @@ void Sampler::take_seats() {
     }
     Seat now = seat_at(port_ids_[i]);
     Seat before = known->second;
-    for (const Accepted& each : accepted_) {
+    for (const Accepted& each : arrivals_.fresh()) {
       if (each.port == name && now.is_arbitrated && each.at <= last_.now)
         follow(name, before, each);
     }
@@ -124,7 +122,7 @@ void Sampler::take_seats() {
   }
   if (memory_->tables().is_whole(last_.snapshot)) {
     seats_ = std::move(seats);
-    std::erase_if(accepted_, [this](const Accepted& each) { return each.at <= last_.now; });
+    arrivals_.drop_until(last_.now);
   } else {  // what was read of the table may have been another's
     takeovers_ = std::move(noted);
     takeovers_so_far_ = so_far;
@@ -155,29 +153,6 @@ Sampler::Seat Sampler::first_seat(shm::PortId port) const {
   seat.since = std::max(tenure.at_least, census_->first_model_since);
   seat.is_exact = tenure.is_exact();
   return seat;
-}
-
-void Sampler::note_arrival(const Accepted& accepted) {
-  auto& times = arrivals_[{accepted.port, accepted.source}];
-  times.push_back(accepted.at);
-  // Twice, for some come between the question and the answer of a census.
-  if (times.size() > std::size_t{2} * shm::kMaxDepth) times.pop_front();
-}
-
-// Of what waits, a queue has the latest that it accepted. The daemon looked at it after it was
-// asked: the oldest one had arrived no earlier than what would have been the oldest one then. Where
-// a tap has lost events, or was closed for a while, the bound is not as good, but it is one.
-std::optional<shm::Nanoseconds> Sampler::oldest_at(const PortFact& port) const {
-  shm::Nanoseconds oldest = 0;
-  for (const auto& [source, waiting] : port.queues) {
-    const auto found = arrivals_.find({port.name, source});
-    if (found == arrivals_.end()) return std::nullopt;
-    const auto& times = found->second;
-    const auto by_then = std::upper_bound(times.begin(), times.end(), census_->asked);
-    if (static_cast<std::uint64_t>(by_then - times.begin()) < waiting) return std::nullopt;
-    oldest = std::max(oldest, census_->at - *(by_then - static_cast<std::ptrdiff_t>(waiting)));
-  }
-  return oldest;
 }
 
 // One that came before what is known already tells nothing new, and so does one that an earlier
@@ -230,7 +205,10 @@ std::string Sampler::cause_of(shm::PortId port, std::uint64_t generation_before,
   const auto is = [this](shm::SourceId source) { return last_.is_active(source); };
   std::string text;
   for (const shm::SourceId source : rules::causes_of_change(table, port, was, is)) {
-    const shm::ActivityWord word = last_.words.at(source);
+    // A table that is not whole may name any source: take_seats() forgets what is said of that.
+    const auto found = last_.words.find(source);
+    if (found == last_.words.end()) continue;
+    const shm::ActivityWord word = found->second;
     const bool has_expired = shm::is_finite(word) && !is(source);
     const shm::Nanoseconds time = has_expired ? word : shm::time_of(word, table.timeout(source));
     at = std::min(at, std::max(time, before_.now));
@@ -263,7 +241,7 @@ std::shared_ptr<const Frame> Sampler::frame(
     PortState& state = frame->ports.emplace_back();
     if (const auto found = tapped.find(each.name); found != tapped.end()) {
       state.is_tapped = true;
-      state.oldest = oldest_at(each);
+      state.oldest = arrivals_.oldest_at(each, *census_);
       state.waits = found->second;
     }
     const auto seat = seats_.find(each.name);

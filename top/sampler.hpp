@@ -7,7 +7,6 @@
 #pragma once
 
 #include <cstdint>
-#include <deque>
 #include <functional>
 #include <map>
 #include <memory>
@@ -17,6 +16,7 @@
 #include <utility>
 #include <vector>
 
+#include "top/arrivals.hpp"
 #include "top/frame.hpp"
 #include "watch/instance.hpp"
 #include "watch/pace.hpp"
@@ -65,8 +65,6 @@ class Sampler {
   void take_seats();
   [[nodiscard]] Seat seat_at(shm::PortId port) const;
   [[nodiscard]] Seat first_seat(shm::PortId port) const;
-  void note_arrival(const Accepted& accepted);
-  [[nodiscard]] std::optional<shm::Nanoseconds> oldest_at(const PortFact& port) const;
   void follow(const std::string& port, Seat& seat, const Accepted& accepted);
   void add_takeover(const std::string& port, shm::SourceId before, shm::SourceId winner,
                     shm::Nanoseconds at, std::string because);
@@ -92,9 +90,7 @@ class Sampler {
   std::chrono::system_clock::time_point wall_;  // of last_
   std::map<std::string, Seat> seats_;           // by port
   std::map<shm::SourceId, watch::Pace> paces_;
-  std::vector<Accepted> accepted_;  // that no picture has come after yet
-  // Of samples that taps told of, by port and source, the latest last: as many as can wait.
-  std::map<std::pair<std::string, std::string>, std::deque<shm::Nanoseconds>> arrivals_;
+  Arrivals arrivals_;  // that taps told of
   std::uint64_t takeovers_so_far_ = 0;
   std::vector<Takeover> takeovers_;
 };

@@ -335,7 +335,7 @@ void View::add_slowness(const std::string& source, std::vector<std::string>& see
   seen.push_back("  ! " + watch::slow_text(source, period, frame.census->sources[index].timeout));
 }
 
-void View::set_answer(const WhyAnswer& answer) {
+void View::set_answer(const WhyReply& answer) {
   const bool is_wanted = asked_ && asked_->ports == answer.question.ports &&
                          asked_->source == answer.question.source &&
                          asked_->moment == answer.question.moment;

@@ -39,7 +39,7 @@ class View {
   // The daemon is there and does not answer.
   void set_silent(bool is_silent) { is_silent_ = is_silent; }
   // Shown if it is what was asked for last and nobody has closed it.
-  void set_answer(const WhyAnswer& answer);
+  void set_answer(const WhyReply& answer);
 
   // What to ask, if anything.
   std::optional<WhyQuestion> press(const KeyPress& press);
@@ -82,6 +82,8 @@ class View {
   void add_slowness(const std::string& source, std::vector<std::string>& seen) const;
   void find_selected(Pane pane, const Table& table);
   void take_up_names(const std::shared_ptr<const Census>& census);
+  std::size_t scroll_to_cursor(Pane pane, const Table& table, std::size_t rows);
+  [[nodiscard]] Line pane_header(Pane pane, const Table& table) const;
   [[nodiscard]] std::vector<Line> draw_pane(Pane pane, Table table, Size size);
   [[nodiscard]] std::array<std::size_t, kPanes> heights(const std::array<Table, kPanes>& tables,
                                                         std::size_t rows) const;

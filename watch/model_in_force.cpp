@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
-#include <iterator>
+#include <ios>
 #include <system_error>
 #include <utility>
 
@@ -23,8 +23,10 @@ FileNow::State state_of(const rules::FileText& file) {
   if (status.type() == fs::file_type::not_found) return FileNow::State::kGone;
   if (status.type() != fs::file_type::regular) return FileNow::State::kUnreadable;
   std::ifstream stream(file.path, std::ios::binary);
-  const std::string now{std::istreambuf_iterator<char>(stream), {}};
+  std::string now(file.content.size() + 1, '\0');  // one more, for it may have grown
+  stream.read(now.data(), static_cast<std::streamsize>(now.size()));
   if (!stream.is_open() || stream.bad()) return FileNow::State::kUnreadable;
+  now.resize(static_cast<std::size_t>(stream.gcount()));
   // What was not UTF-8 is not as it was read.
   const bool is_whole = file.content.find(kReplacement) == std::string::npos;
   return is_whole && now != file.content ? FileNow::State::kChanged : FileNow::State::kSame;

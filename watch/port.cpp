@@ -3,7 +3,6 @@
 #include <string_view>
 #include <utility>
 
-#include "rules/model/load.hpp"
 #include "rules/prove/table_rules.hpp"
 #include "rules/text/names.hpp"
 
@@ -27,11 +26,13 @@ shm::PortId require_port(Instance& instance, const std::string& name) {
 
 }  // namespace
 
-Port::Port(std::shared_ptr<Instance> instance, std::string name)
+Port::Port(std::shared_ptr<Instance> instance, std::string name,
+           std::shared_ptr<ModelLoader> models)
     : instance_(std::move(instance)),
       memory_(instance_->memory()),
       name_(std::move(name)),
-      id_(require_port(*instance_, name_)) {}
+      id_(require_port(*instance_, name_)),
+      models_(models != nullptr ? std::move(models) : std::make_shared<ModelLoader>(instance_)) {}
 
 void Port::find_again() { id_ = instance_->find_port(name_).value_or(id_); }
 
@@ -60,7 +61,7 @@ Look Port::look() const {
     look = {};
     look.picture = take_picture(*memory_, sources_at(id_));
     read_table(look);
-  } while (!memory_->tables().is_whole(look.picture.snapshot));
+  } while (!is_whole(look.picture.snapshot));
   return look;
 }
 
@@ -83,33 +84,21 @@ Look Port::look_back(const KeptPicture& kept) const {
       if (word == kept.words.end()) look.picture.unseen.push_back(source);
     }
     read_table(look);
-  } while (!memory_->tables().is_whole(look.picture.snapshot));
+  } while (!is_whole(look.picture.snapshot));
   return look;
 }
 
-void Port::fetch_model() {
-  model_ = ModelInForce::fetch(*instance_);
-  generation_ = model_.generation();
-  rules_ = {};
-  diagnostics_ = {};
-  if (!model_.has_texts()) return;
-  rules_ = rules::load(model_.texts(), diagnostics_, rules::Keep::kProvenance);
-  if (diagnostics_.has_errors()) {
-    throw WatchError("this program cannot read the daemon's model; are both of one version?");
-  }
-}
-
 void Port::add_timeouts(Look& look) const {
-  const rules::Explainer explainer(rules_);
+  const rules::Explainer explainer(model_->rules);
   for (const auto& [source, word] : look.picture.words) {
     const std::string& name = source_name(source);
     SourceState state = look.sources.state(name);
-    if (model_.has_texts()) {
+    if (model().has_texts()) {
       const auto where = explainer.place_of_timeout(name);
       state.timeout_place =
           where.file.empty() ? "default" : where.file + ":" + std::to_string(where.line);
     }
-    if (const auto before = model_.timeout_before(name)) {
+    if (const auto before = model().timeout_before(name)) {
       state.timeout_before = before->timeout;
       state.timeout_changed = before->until;
       state.word_at_change = before->word;
@@ -119,15 +108,19 @@ void Port::add_timeouts(Look& look) const {
 }
 
 std::optional<rules::PortExplanation> Port::explain(const Look& look) {
-  if (generation_ != look.generation()) fetch_model();
-  if (generation_ != look.generation()) return std::nullopt;
+  if (model_ == nullptr || model().generation() != look.generation()) {
+    auto loaded = models_->load(look.generation());
+    require_memory();  // a daemon with memory of its own may have a model of that number
+    model_ = std::move(loaded);
+  }
+  if (model().generation() != look.generation()) return std::nullopt;
   const auto is_active = [&](const std::string& source) { return look.sources.is_active(source); };
-  if (!model_.has_texts()) {
+  if (!model().has_texts()) {
     const auto name_of = [this](shm::SourceId source) { return source_name(source); };
     const auto rules = rules::rules_of_table(look.table(), id_, name_, name_of);
     return rules::Explainer(rules).explain(name_, is_active);
   }
-  auto explanation = rules::Explainer(rules_).explain(name_, is_active);
+  auto explanation = rules::Explainer(model_->rules).explain(name_, is_active);
   const auto winner =
       look.winner == shm::kNone ? std::nullopt : std::optional(source_name(look.winner));
   if (explanation.winner != winner) {

@@ -6,7 +6,6 @@
 #include <map>
 #include <memory>
 #include <optional>
-#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -14,18 +13,15 @@
 #include "rules/text/diagnostic.hpp"
 #include "shm/activity.hpp"
 #include "shm/ids.hpp"
+#include "shm/table_ring.hpp"
 #include "watch/instance.hpp"
 #include "watch/model_in_force.hpp"
+#include "watch/model_loader.hpp"
 #include "watch/picture.hpp"
 #include "watch/sources.hpp"
+#include "watch/watch_error.hpp"
 
 namespace arbiter::watch {
-
-// What was asked for is not there: the message says what is.
-class WatchError : public std::runtime_error {
- public:
-  using std::runtime_error::runtime_error;
-};
 
 // One look at a port.
 struct Look {
@@ -49,8 +45,10 @@ struct KeptPicture {
 
 class Port {
  public:
-  // Keeps the instance. Throws WatchError where nobody has named such an input port.
-  Port(std::shared_ptr<Instance> instance, std::string name);
+  // Keeps the instance. `models`: of the same instance, for several of its ports; null: one of its
+  // own. Throws WatchError where nobody has named such an input port.
+  Port(std::shared_ptr<Instance> instance, std::string name,
+       std::shared_ptr<ModelLoader> models = nullptr);
 
   // Asks nobody. Throws WatchError where a daemon has come that does not have the memory of the one
   // in which the port was found.
@@ -58,9 +56,14 @@ class Port {
   // What look() would have said then; of a source that the picture lacks, as of one that has no
   // page. Throws WatchError also where another model has come into force since.
   [[nodiscard]] Look look_back(const KeptPicture& kept) const;
+  // Whether all that was read of a look's table so far was the table's own.
+  [[nodiscard]] bool is_whole(const shm::TableSnapshot& snapshot) const {
+    return memory_->tables().is_whole(snapshot);
+  }
   // By the texts of the model that the look was taken under; nothing if another one has come into
   // force since: look again. Asks the daemon where it is a model that was not explained before.
-  // Throws as Instance::ask(), and WatchError.
+  // Throws as Instance::ask(), and WatchError, also where a daemon has come that does not have the
+  // memory of the one in which the port was found.
   std::optional<rules::PortExplanation> explain(const Look& look);
 
   // To be called when another model has come into force, and the instance has caught up with it: a
@@ -74,31 +77,30 @@ class Port {
   [[nodiscard]] const std::string& source_name(shm::SourceId source) const {
     return memory_->source_name(source);
   }
-  // That was explained last.
-  [[nodiscard]] const ModelInForce& model() const { return model_; }
+  // That was explained last, as what follows: one must have been.
+  [[nodiscard]] const ModelInForce& model() const { return model_->in_force; }
   // What it mentions; nothing where the daemon does not know its texts.
-  [[nodiscard]] const std::vector<std::string>& known_sources() const { return rules_.sources; }
+  [[nodiscard]] const std::vector<std::string>& known_sources() const {
+    return model_->rules.sources;
+  }
   [[nodiscard]] std::vector<std::string> known_ports() const {
-    return rules::Explainer(rules_).ports();
+    return rules::Explainer(model_->rules).ports();
   }
   // What was found when it was loaded.
-  [[nodiscard]] const rules::Diagnostics& diagnostics() const { return diagnostics_; }
+  [[nodiscard]] const rules::Diagnostics& diagnostics() const { return model_->diagnostics; }
   // With where T comes from, and what it was. `look` must be of that model.
   void add_timeouts(Look& look) const;
 
  private:
   void require_memory() const;
   void read_table(Look& look) const;
-  void fetch_model();
 
   const std::shared_ptr<Instance> instance_;
   const std::shared_ptr<const shm::DecisionMemory> memory_;
   const std::string name_;
   shm::PortId id_;
-  std::optional<std::uint64_t> generation_;  // of what follows
-  ModelInForce model_;
-  rules::RuleSet rules_;
-  rules::Diagnostics diagnostics_;
+  const std::shared_ptr<ModelLoader> models_;
+  std::shared_ptr<const ModelWithRules> model_;  // null: none has been explained yet
 };
 
 }  // namespace arbiter::watch

@@ -3,6 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cstdint>
+
 #include "tests/top/pictures.hpp"
 
 namespace arbiter::top {
@@ -111,6 +114,14 @@ TEST(TopCensus, KnowsSinceWhenOnlyOfTheFirstModel) {
   EXPECT_EQ(census_of(now, nullptr).first_model_since, 90 * kSecond);
   now.wall = {};  // the clock has been set
   EXPECT_EQ(census_of(now, nullptr).first_model_since, 100 * kSecond);
+  for (const std::int64_t wall_ms : {0, 50'000, -50'000}) {
+    now.wall = std::chrono::system_clock::time_point(std::chrono::milliseconds(wall_ms));
+    now.status.history[0].since_ms = INT64_MAX;
+    EXPECT_EQ(census_of(now, nullptr).first_model_since, 100 * kSecond);
+    now.status.history[0].since_ms = INT64_MIN;
+    EXPECT_EQ(census_of(now, nullptr).first_model_since,
+              100 * kSecond - std::max(wall_ms, std::int64_t{0}) * 1'000'000);
+  }
   model.how = "reload";
   now.status.history.insert(now.status.history.begin(), model);
   EXPECT_EQ(census_of(now, nullptr).first_model_since, 0);

@@ -77,6 +77,19 @@ TEST(TopHistory, KeepsFewerPicturesOfALargeInstance) {
   EXPECT_EQ(second_of(history), 6);
 }
 
+TEST(TopHistory, CountsAllThatAPictureHasOfEachSource) {
+  History history(1000);
+  Frame frame = frame_at(1);
+  frame.words.resize(1'000'000);
+  frame.slow_periods.resize(1'000'000);
+  for (int i = 1; i <= 9; ++i) {
+    frame.now = i * kSecond;
+    history.add(shared(frame), {});
+  }
+  history.step(-1000);
+  EXPECT_EQ(second_of(history), 8);
+}
+
 TEST(TopHistory, KeepsSoManyChanges) {
   History history(10, 2);
   Frame frame = frame_at(1);

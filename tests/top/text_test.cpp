@@ -102,5 +102,22 @@ TEST_F(TopText, BreaksLinesAtBlanks) {
   }
 }
 
+TEST_F(TopText, AnOverlayFollowsTheScreen) {
+  const std::vector<std::string> text = {"one two three four", "abcdefghijklmnopqrstuvwxyz"};
+  const auto drawn = [](Overlay& overlay, std::size_t width, Charset charset) {
+    std::string all;
+    for (const Line& each : overlay.draw(width, 20, charset)) all += each.text() + "\n";
+    return all;
+  };
+  Overlay overlay("title", text);
+  for (const Charset charset : {Charset::kUtf8, Charset::kAscii}) {
+    for (const std::size_t width : {30u, 10u, 10u, 20u}) {
+      Overlay anew("title", text);
+      EXPECT_EQ(drawn(overlay, width, charset), drawn(anew, width, charset));
+    }
+  }
+  EXPECT_NE(drawn(overlay, 30, Charset::kUtf8), drawn(overlay, 10, Charset::kUtf8));
+}
+
 }  // namespace
 }  // namespace arbiter::top

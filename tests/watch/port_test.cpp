@@ -4,12 +4,15 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cstdint>
+#include <memory>
 #include <string>
 
 #include <arbiter/arbiter.hpp>
 
 #include "tests/support/error_of.hpp"
 #include "tests/watch/watched.hpp"
+#include "watch/model_loader.hpp"
 #include "watch/obstacles.hpp"
 
 namespace arbiter::test {
@@ -113,6 +116,66 @@ TEST(WatchedPort, OfADaemonThatHasMemoryOfItsOwnIsSeenNoMore) {
   update_until(*instance, [&] { return instance->memory() != memory; });
   EXPECT_THAT(error_of([&] { static_cast<void>(port.look()); }),
               HasSubstr("another daemon has started without the memory of the last one"));
+}
+
+TEST(WatchedPort, IsNotExplainedByTheModelOfADaemonThatHasMemoryOfItsOwn) {
+  Daemon daemon(kGazeModel);
+  watch::Port port(watched(daemon), "/p");
+  const watch::Look look = port.look();
+  daemon.kill();
+  daemon.lose_state();
+  daemon.restart();
+  EXPECT_THAT(error_of([&] { static_cast<void>(port.explain(look)); }),
+              HasSubstr("another daemon has started without the memory of the last one"));
+}
+
+TEST(WatchedPort, KnowsWhetherTheTableOfALookHasBeenOverwritten) {
+  Daemon daemon(kGazeModel);
+  const watch::Port port(watched(daemon), "/p");
+  const watch::Look look = port.look();
+  daemon.load(kGazeModel);
+  EXPECT_TRUE(port.is_whole(look.picture.snapshot));
+  for (std::uint32_t i = 1; i < shm::kTableSlots; ++i) daemon.load(kGazeModel);
+  EXPECT_FALSE(port.is_whole(look.picture.snapshot));
+}
+
+TEST(WatchedPort, SharesTheModelWithOtherPorts) {
+  Daemon daemon(
+      "<behaviors><arbiter at='/p'><select from='/a'/></arbiter>"
+      "<arbiter at='/q'><select from='/a'/></arbiter></behaviors>");
+  const auto instance = watched(daemon);
+  const auto models = std::make_shared<watch::ModelLoader>(instance);
+  watch::Port p(instance, "/p", models);
+  watch::Port q(instance, "/q", models);
+  const auto model_of = [](watch::Port& port) {
+    EXPECT_TRUE(port.explain(port.look()));
+    return &port.model();
+  };
+  const auto* first = model_of(p);
+  EXPECT_EQ(model_of(q), first);
+  daemon.load("<behaviors><arbiter at='/p'><select from='/b'/></arbiter></behaviors>");
+  const auto* second = model_of(p);
+  EXPECT_EQ(second->generation(), 2u);
+  EXPECT_EQ(q.model().generation(), 1u) << "it has not been explained since";
+  EXPECT_EQ(model_of(q), second);
+}
+
+// It may know less of the model than the last one.
+TEST(WatchedModel, IsLoadedAnewFromAnotherDaemon) {
+  Daemon daemon(kGazeModel);
+  Node node("component");  // who hands the memory on
+  auto low = node.output_port<int>("/low");
+  const auto instance = watched(daemon);
+  watch::ModelLoader models(instance);
+  const auto first = models.load(1);
+  EXPECT_TRUE(first->in_force.has_texts());
+  EXPECT_EQ(models.load(1), first);
+  daemon.kill();
+  daemon.restart_without_model();
+  update_until(*instance, [&] { return instance->daemons() == 2; });
+  const auto second = models.load(1);
+  EXPECT_EQ(second->in_force.generation(), 1u);
+  EXPECT_FALSE(second->in_force.has_texts());
 }
 
 TEST(WatchedPort, KnowsWhatKeepsSamplesFromIt) {
