@@ -185,6 +185,12 @@ class ChannelReader {
         nothing_new_ = entry;
         return 0;
       }
+      // The rings of a channel lie over each other: behind the end of this queue, the next one's
+      // entries. Relaxed is enough: who sees such an entry finds its receiver, too.
+      if (channel_->receiver.load(std::memory_order_relaxed) != self_) {
+        state_ = State::kLeft;
+        return 0;
+      }
       if (ahead % depth_ != 0) {
         state_ = State::kMisbehaved;
         return 0;
@@ -258,6 +264,15 @@ class ChannelReader {
     return state_ == State::kJoined
                ? channel_->accepted.load(std::memory_order_acquire) & kSequenceMask
                : next_ - 1;
+  }
+  // The same of a queue that may have ended: by now the channel may count for the next one.
+  [[nodiscard]] std::uint64_t last_end() const noexcept {
+    const std::uint64_t end = backlog_end();
+    if (state_ != State::kJoined) return end;
+    // SYNC POINT: channel-joined (see ChannelWriter::join()).
+    const PortInstance receiver = channel_->receiver.load(std::memory_order_acquire);
+    if (receiver == self_ || receiver == 0) return end;
+    return (channel_->first.load(std::memory_order_relaxed) - 1) & kSequenceMask;
   }
   // How many entries wait, given that end; at most the depth, whatever the publisher says.
   [[nodiscard]] std::uint64_t backlog(std::uint64_t end) const noexcept {

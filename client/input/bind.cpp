@@ -83,7 +83,7 @@ void InputCore::retire_queue(Queue& queue, const InputView& next) {
     join(queue);
     count(counters.overtaken, queue.reader.left_behind());
   } else {
-    count(counters.dropped, queue.reader.backlog(queue.reader.backlog_end()));
+    count(counters.dropped, queue.reader.backlog(queue.reader.last_end()));
   }
   if (queue.peer->held != 0) {
     auto kept = std::make_unique<InputView>();

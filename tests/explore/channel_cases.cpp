@@ -1,4 +1,7 @@
 // A slot is never written while a receiver reads it (shm/channel.hpp, shm/slot_pool.hpp).
+#include <functional>
+#include <utility>
+
 #include "tests/explore/case.hpp"
 #include "tests/explore/scenario.hpp"
 
@@ -112,10 +115,11 @@ const Register kEnds("AQueueThatEndsTakesItsSamplesFromNobodyWhoHoldsOne", {4, 3
                        explore(leave_and_reuse(world));
                      });
 
+// A receiver whose ring lies where the other's did.
+constexpr shm::PortInstance kNext = kReceiver + shm::kPageSize / shm::kCacheLine;
+
 // A receiver looks for its queue while the publisher begins it, in a channel that another has used.
 Explorer::Scenario join_a_used_channel(World& world) {
-  // One whose ring lies where the other's did.
-  static constexpr shm::PortInstance kNext = kReceiver + shm::kPageSize / shm::kCacheLine;
   return [&world](Execution& execution) {
     world.reset(1);
     Publisher& publisher = world.publisher;
@@ -146,6 +150,47 @@ const Register kJoining("AReceiverFindsItsQueueWholeOrNotAtAll", {3, 2},
                         [](const Explore& explore) {
                           World world;
                           explore(join_a_used_channel(world));
+                        });
+
+// A queue ends, and the channel has another, before its receiver has heard of it.
+Explorer::Scenario go_on_without(World& world, std::uint64_t taken,
+                                 std::function<void(World&)> receive) {
+  return [&world, taken, receive = std::move(receive)](Execution& execution) {
+    world.reset(2);
+    while (world.receiver.last != taken) world.receiver.take();
+    execution.thread([&world] {
+      Publisher& publisher = world.publisher;
+      publisher.writer.leave([&](std::uint32_t slot) { publisher.pool.evict(slot); });
+      publisher.writer = shm::ChannelWriter(publisher.segment, 0);
+      publisher.writer.join(kNext, 1, 2);
+      publisher.publish();
+      publisher.publish();
+    });
+    execution.thread([&world, &receive] { receive(world); });
+  };
+}
+
+// The next one's entries lie at other places than its own would.
+void take_what_is_anothers(World& world) {
+  for (int i = 0; i < 2; ++i) require(!world.receiver.take(), "a sample of another's was taken");
+  require(world.receiver.reader.state() != shm::ChannelReader::State::kMisbehaved,
+          "an honest publisher looks like another");
+  require(world.receiver.lost == 1, "samples of another's count as lost");
+}
+const Register kAnothers("AReceiverThatIsLateTakesNoHonestPublisherForAnother", {3, 2},
+                         [](const Explore& explore) {
+                           World world;
+                           explore(go_on_without(world, 3, take_what_is_anothers));
+                         });
+
+void count_what_waits(World& world) {
+  const shm::ChannelReader& reader = world.receiver.reader;
+  require(reader.backlog(reader.last_end()) == 1, "samples of another's count as dropped");
+}
+const Register kWaiting("WhatTheNextLinkAcceptsIsNotCountedForTheLast", {3, 2},
+                        [](const Explore& explore) {
+                          World world;
+                          explore(go_on_without(world, 2, count_what_waits));
                         });
 
 }  // namespace
