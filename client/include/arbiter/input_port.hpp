@@ -2,9 +2,10 @@
 //
 // Units: sizes in bytes, times in nanoseconds of CLOCK_MONOTONIC. Threads: use a port, and its
 // samples, from one thread at a time. Blocking: only wait_for() blocks. Cost: take() needs no lock,
-// no allocation and no system call (docs/benchmarks.md has its time); wait_for() sleeps in the
-// kernel. Errors: take() and wait_for() throw arbiter::Error for more than max_held samples; other
-// calls that throw say so.
+// no allocation and no system call (docs/benchmarks.md has its time), but for the first one after a
+// connection has come or gone, or another model has come into force (docs/real-time.md);
+// wait_for() sleeps in the kernel. Errors: take() and wait_for() throw arbiter::Error for more than
+// max_held samples; other calls that throw say so.
 #pragma once
 
 #include <chrono>

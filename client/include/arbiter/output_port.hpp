@@ -3,9 +3,10 @@
 // Units: sizes in bytes, times in nanoseconds of CLOCK_MONOTONIC (arbiter::Time). Threads: use a
 // port, and its loans, from one thread at a time. Blocking: no call blocks. None takes a lock or
 // allocates, except describe(), and the first call after a connection has come or gone, which
-// allocates some 200 bytes for each. A port that has been moved from may be assigned to and
-// destroyed, and nothing else: no call checks for that. Errors: each call says what it throws; the
-// others are noexcept. Cost: see publish(); measured in docs/benchmarks.md.
+// allocates some 200 bytes for each, or after another model has come into force, if it has more to
+// read (docs/real-time.md). A port that has been moved from may be assigned to and destroyed, and
+// nothing else: no call checks for that. Errors: each call says what it throws; the others are
+// noexcept. Cost: see publish(); measured in docs/benchmarks.md.
 #pragma once
 
 #include <cstddef>
