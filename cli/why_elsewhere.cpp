@@ -97,8 +97,12 @@ std::string death_there(const wire::Status& status, const watch::PortEnd& end, c
   return death == nullptr ? "" : watch::death_text(*death, status.now);
 }
 
+std::string death_of_source(const wire::Status& status, const std::string& source) {
+  return death_there(status, watch::kOutputEnd, status.find_source(source));
+}
+
 void write_death(std::ostream& out, const wire::Status& status, const std::string& source) {
-  const std::string text = death_there(status, watch::kOutputEnd, status.find_source(source));
+  const std::string text = death_of_source(status, source);
   if (!text.empty()) out << "  ! " << text << '\n';
 }
 
@@ -149,10 +153,14 @@ wire::InputStatus only(wire::InputStatus input, const std::string& source) {
   return input;
 }
 
+bool is_open_there(const wire::InputStatus& input) { return input.open || input.away_pid; }
+
+json text_or_null(const std::string& text) { return text.empty() ? json(nullptr) : json(text); }
+
 // Of a port that nobody has open there.
 void write_where_it_is_open(std::ostream& out, const Elsewhere& there,
                             const wire::InputStatus& input, const std::string& host) {
-  if (input.open || input.away_pid) return;
+  if (is_open_there(input)) return;
   if (!input.winner) out << "  ! no component there has the port open: nothing is taken\n";
   for (const wire::HostStatus& each : there.hosts.hosts) {
     const auto& inputs = each.inputs;
@@ -168,10 +176,10 @@ void write_text(std::ostream& out, const Elsewhere& there, const wire::InputStat
                 const std::string& host) {
   const rules::PortExplanation explanation = explain(there, input.name);
   const wire::HostStatus* const found = there.hosts.find_host(host);
-  const bool is_open = input.open || input.away_pid;
-  out << input.name << (is_open ? " is decided on host " : " is not open on host ") << host
-      << ", round trip " << round_trip_text(found == nullptr ? std::nullopt : found->round_trip)
-      << ", by " << shm::printable(there.model.text()) << '\n';
+  out << input.name << (is_open_there(input) ? " is decided on host " : " is not open on host ")
+      << host << ", round trip "
+      << round_trip_text(found == nullptr ? std::nullopt : found->round_trip) << ", by "
+      << shm::printable(there.model.text()) << '\n';
   if (!input.arbitrated) {
     out << "  not arbitrated: everything is delivered\n";
   } else if (input.cannot_deliver) {
@@ -202,11 +210,6 @@ void write_text(std::ostream& out, const Elsewhere& there, const wire::InputStat
   }
 }
 
-json death_there_json(const wire::Status& status, const std::string& source) {
-  const std::string text = death_there(status, watch::kOutputEnd, status.find_source(source));
-  return text.empty() ? json(nullptr) : json(text);
-}
-
 json json_of(const Elsewhere& there, const wire::InputStatus& input, const std::string& host) {
   const rules::PortExplanation explanation = explain(there, input.name);
   const wire::HostStatus* const found = there.hosts.find_host(host);
@@ -215,46 +218,62 @@ json json_of(const Elsewhere& there, const wire::InputStatus& input, const std::
                    {"round_trip_ns", nullptr},
                    {"generation", there.model.generation()},
                    {"arbitrated", input.arbitrated},
-                   {"open", input.open || input.away_pid},
-                   {"winner", nullptr},
-                   {"nothing_comes_of_it", nullptr},
+                   {"open", is_open_there(input)},
+                   {"winner", text_or_null(input.winner.value_or(""))},
+                   {"nothing_comes_of_it", text_or_null(why_nothing_comes(there.status, input))},
                    {"connections", json::array()},
                    {"senses", json::array()}};
   if (found != nullptr && found->round_trip) document["round_trip_ns"] = *found->round_trip;
-  if (input.winner) document["winner"] = *input.winner;
-  const std::string why = why_nothing_comes(there.status, input);
-  if (!why.empty()) document["nothing_comes_of_it"] = why;
   for (const wire::ConnectionStatus& each : input.connections) {
-    document["connections"].push_back({{"source", each.source},
-                                       {"active", each.active},
-                                       {"wins", each.winner},
-                                       {"component", component_text(there.status, each.source)},
-                                       {"death", death_there_json(there.status, each.source)},
-                                       {"causes", causes_of(explanation, each.source)}});
+    document["connections"].push_back(
+        {{"source", each.source},
+         {"active", each.active},
+         {"wins", each.winner},
+         {"component", component_text(there.status, each.source)},
+         {"death", text_or_null(death_of_source(there.status, each.source))},
+         {"causes", causes_of(explanation, each.source)}});
   }
   for (const wire::SensedStatus& each : input.senses) {
-    document["senses"].push_back({{"source", each.source},
-                                  {"active", each.active},
-                                  {"death", death_there_json(there.status, each.source)}});
+    document["senses"].push_back(
+        {{"source", each.source},
+         {"active", each.active},
+         {"death", text_or_null(death_of_source(there.status, each.source))}});
   }
   return document;
 }
 
 // What a change of the winner is made of, as far as two answers show it.
 struct SeenPort {
-  std::string winner;  // "idle", "not open there"
-  std::map<std::string, bool> active;
+  wire::InputStatus input;  // of one that is gone: neither mentioned nor open
   std::uint64_t generation = 0;
+
+  [[nodiscard]] std::string winner() const {
+    if (generation == 0) return "no model";
+    if (!input.mentioned) return "not mentioned";
+    return !input.arbitrated ? "not arbitrated" : input.winner.value_or("idle");
+  }
+  [[nodiscard]] std::map<std::string, bool> activities() const {
+    std::map<std::string, bool> active;
+    for (const auto& each : input.connections) active[each.source] = each.active;
+    for (const auto& each : input.senses) active[each.source] = each.active;
+    return active;
+  }
 };
 
 SeenPort seen_in(const wire::Status& status, const std::string& port) {
-  SeenPort seen{"not open there", {}, status.model.generation};
   const wire::InputStatus* const input = status.find_input(port);
-  if (input == nullptr) return seen;
-  seen.winner = !input->arbitrated ? "not arbitrated" : input->winner.value_or("idle");
-  for (const auto& each : input->connections) seen.active[each.source] = each.active;
-  for (const auto& each : input->senses) seen.active[each.source] = each.active;
-  return seen;
+  return {input == nullptr ? wire::InputStatus{} : *input, status.model.generation};
+}
+
+// The sources that are active and were not, or the other way round.
+std::map<std::string, bool> changed_activities(const SeenPort& before, const SeenPort& now) {
+  const auto old = before.activities();
+  auto changed = now.activities();
+  std::erase_if(changed, [&](const auto& each) {
+    const auto was = old.find(each.first);
+    return was == old.end() || was->second == each.second;
+  });
+  return changed;
 }
 
 std::string difference(const SeenPort& before, const SeenPort& now) {
@@ -262,13 +281,25 @@ std::string difference(const SeenPort& before, const SeenPort& now) {
   if (before.generation != now.generation) {
     text = "model " + std::to_string(now.generation) + " came into force";
   }
-  for (const auto& [source, is_active] : now.active) {
-    const auto was = before.active.find(source);
-    if (was == before.active.end() || was->second == is_active) continue;
+  for (const auto& [source, is_active] : changed_activities(before, now)) {
     text += (text.empty() ? "" : " and ") + source +
             (is_active ? " became active" : " became inactive");
   }
   return text.empty() ? "something happened between two looks" : text;
+}
+
+// As why --follow has it of a port of this host; null: what only that host could say.
+json line_of_change(const SeenPort& before, const SeenPort& now) {
+  json because = json::array();
+  for (const auto& [source, is_active] : changed_activities(before, now)) {
+    because.push_back(
+        {{"source", source}, {"became", is_active ? "active" : "inactive"}, {"at_ns", nullptr}});
+  }
+  const bool is_new_model = before.generation != now.generation;
+  return {{"old", text_or_null(before.input.winner.value_or(""))},
+          {"because", std::move(because)},
+          {"model", is_new_model ? json(now.generation) : json(nullptr)},
+          {"old_loses", nullptr}};
 }
 
 class FollowerElsewhere {
@@ -277,9 +308,12 @@ class FollowerElsewhere {
       : options_(options), host_(std::move(host)) {
     Elsewhere there;
     there.status = status();
-    static_cast<void>(require_input(there, options_.port, host_));
-    last_ = seen_in(there.status, options_.port);
+    last_ = {require_input(there, options_.port, host_), there.status.model.generation};
     write(last_, nullptr);
+    if (options_.json) return;
+    there.hosts = hosts_if_linked(options_.instance).value_or(wire::HostsDocument{});
+    write_where_it_is_open(std::cout, there, last_.input, host_);
+    std::cout << std::flush;
   }
 
   int run(const shm::FileDescriptor& interrupts) {
@@ -289,7 +323,7 @@ class FollowerElsewhere {
       try {
         SeenPort now = seen_in(status(), options_.port);
         say("host " + host_ + " answers");
-        if (now.winner != last_.winner) {
+        if (now.winner() != last_.winner()) {
           write(now, &last_);
           if (++changes == options_.count) return 0;
         }
@@ -316,18 +350,25 @@ class FollowerElsewhere {
   void write(const SeenPort& now, const SeenPort* before) const {
     const shm::Nanoseconds at = shm::monotonic_now();
     if (options_.json) {
-      json line = {{"at_ns", at}, {"port", options_.port}, {"host", host_}, {"winner", now.winner}};
-      if (before != nullptr) line["old"] = before->winner;
-      if (before != nullptr) line["because"] = difference(*before, now);
+      json line = {{"at_ns", at},
+                   {"port", options_.port},
+                   {"host", host_},
+                   {"open", is_open_there(now.input)},
+                   {"mentioned", now.input.mentioned},
+                   {"arbitrated", now.input.arbitrated},
+                   {"winner", text_or_null(now.input.winner.value_or(""))}};
+      if (before != nullptr) line.update(line_of_change(*before, now));
       std::cout << line.dump(-1, ' ', false, json::error_handler_t::replace) << std::endl;
       return;
     }
     std::cout << seconds_text(at - started_) << "  ";
     if (before == nullptr) {
-      std::cout << options_.port << " on host " << host_ << ": " << now.winner << ", by model "
-                << now.generation << "; asked twice a second" << std::endl;
+      std::cout << options_.port
+                << (is_open_there(now.input) ? " on host " : " is not open on host ") << host_
+                << ": " << now.winner() << ", by model " << now.generation
+                << "; asked twice a second" << std::endl;
     } else {
-      std::cout << before->winner << " -> " << now.winner << "  because "
+      std::cout << before->winner() << " -> " << now.winner() << "  because "
                 << difference(*before, now) << std::endl;
     }
   }
@@ -344,32 +385,6 @@ class FollowerElsewhere {
 int follow_elsewhere(const WhyOptions& options, const std::string& host) {
   const shm::FileDescriptor interrupts = catch_interrupts();
   return FollowerElsewhere(options, host).run(interrupts);
-}
-
-std::optional<std::string> host_that_decides(const std::string& port,
-                                             const wire::HostsDocument& hosts) {
-  std::vector<std::string> found;
-  for (const wire::HostStatus& host : hosts.hosts) {
-    const bool has_it =
-        std::find(host.inputs.begin(), host.inputs.end(), port) != host.inputs.end();
-    if (!has_it || !host.is_up) continue;
-    if (host.is_this) return std::nullopt;
-    found.push_back(host.host);
-  }
-  if (found.size() > 1) {
-    throw watch::WatchError(port + " is open on the hosts " + rules::enumerate(found) +
-                            ", and each decides it for itself: name one with --host");
-  }
-  return found.empty() ? std::nullopt : std::optional(found.front());
-}
-
-void require_one_host(const std::string& name, const wire::HostsDocument& hosts) {
-  const auto count = std::count_if(hosts.hosts.begin(), hosts.hosts.end(), [&](const auto& each) {
-    return each.is_up && each.host == name;
-  });
-  if (count < 2) return;
-  throw watch::WatchError(std::to_string(count) + " machines are called " + name +
-                          ": give the link of each its own --host");
 }
 
 void write_why_elsewhere(std::ostream& out, const WhyOptions& options, const std::string& host) {

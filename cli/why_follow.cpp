@@ -130,7 +130,11 @@ class Follower {
       because = model.text() + " came into force" + how_text(model);
     }
     if (!causes.empty() && !is_new_model) because = events_text(port_, causes, look);
-    const std::string loser = loss_text(*explanation, name_of(last_), look.sources);
+    const std::string old = name_of(last_);
+    std::string loser;
+    for (const auto& each : explanation->connections) {
+      if (each.source == old && each.is_active) loser = loss_text(each, look.sources);
+    }
     if (options_.json) {
       json events = json::array();
       for (const shm::SourceId source : causes) {
@@ -148,9 +152,9 @@ class Follower {
                   {"old_loses", loser.empty() ? json(nullptr) : json(loser)}});
       return true;
     }
-    std::cout << seconds_text(at - started_) << "  " << name_of(last_) << " -> " << name_of(look)
-              << "  because " << because
-              << (loser.empty() ? "" : "; " + name_of(last_) + " is " + loser) << std::endl;
+    std::cout << seconds_text(at - started_) << "  " << old << " -> " << name_of(look)
+              << "  because " << because << (loser.empty() ? "" : "; " + old + " is " + loser)
+              << std::endl;
     return true;
   }
 

@@ -72,9 +72,10 @@ watch::Fates fates_elsewhere(const WhyOptions& options, const wire::Status& here
     const std::string host = shm::printable(import->host);
     const wire::HostStatus* const known = hosts.find_host(import->host);
     if (known == nullptr || !known->is_up) {
-      fates[source] = "host " + host + ", which it came from, is gone" +
-                      (known == nullptr ? "" : " since " + span_since(known->since) + " ago") +
-                      " (arbiter hosts)";
+      fates[source] =
+          "host " + host + ", which it came from, " +
+          (known == nullptr ? "is gone" : "has been gone for " + span_since(known->since)) +
+          " (arbiter hosts)";
       continue;
     }
     const auto [found, is_new] = asked.try_emplace(import->host);

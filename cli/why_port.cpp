@@ -69,8 +69,8 @@ std::string WhyAnswer::since_text() const {
   const shm::Nanoseconds now = look_.sources.now();
   const ModelInForce& model = port_.model();
   if (tenure_.is_exact()) {
-    return ", since " + span_text(now - tenure_.at_least) +
-           " ago: " + events_text(port_, tenure_.changed, look_);
+    return ", for " + span_text(now - tenure_.at_least) + ", since " +
+           events_text(port_, tenure_.changed, look_);
   }
   const shm::Nanoseconds decided_since = model.since(port_.name());
   if (tenure_.at_least != 0 && tenure_.at_least == decided_since) {

@@ -75,10 +75,6 @@ std::string inhibition_text(const rules::Cause& cause, const Sources& sources) {
   return text;
 }
 
-}  // namespace
-
-namespace {
-
 std::string timeout_text(const SourceState& source) {
   const std::string& place = source.timeout_place;
   return "T " + rules::to_string(source.timeout) +
@@ -100,7 +96,7 @@ std::string ending_text(const SourceState& source, shm::Nanoseconds now) {
 }
 
 std::string ended_text(const SourceState& source, shm::Nanoseconds now) {
-  return "inactive (since " + span_text(now - source.word) + " ago; " + past_timeout_text(source);
+  return "inactive (for " + span_text(now - source.word) + "; " + past_timeout_text(source);
 }
 
 }  // namespace
@@ -201,15 +197,9 @@ std::string first_cause(const rules::ConnectionExplanation& connection, const So
   return "nothing";
 }
 
-std::string loss_text(const rules::PortExplanation& port, const std::string& loser,
-                      const Sources& sources) {
-  if (!sources.is_active(loser)) return {};
-  for (const auto& each : port.connections) {
-    if (each.source != loser) continue;
-    const std::string cause = first_cause(each, sources);
-    return cause.starts_with("inhibited") ? cause : "out: " + cause;
-  }
-  return {};
+std::string loss_text(const rules::ConnectionExplanation& loser, const Sources& sources) {
+  const std::string cause = first_cause(loser, sources);
+  return cause.starts_with("inhibited") ? cause : "out: " + cause;
 }
 
 void write_causes(std::ostream& out, const rules::ConnectionExplanation& connection,

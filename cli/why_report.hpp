@@ -34,10 +34,8 @@ std::string headline(const rules::Cause& cause);
 // of the first.
 std::string first_cause(const rules::ConnectionExplanation& connection, const Sources& sources);
 
-// "inhibited by …", "out: …": why one that had won does not any more, though it is active; empty
-// where it is not active, or not told of.
-std::string loss_text(const rules::PortExplanation& port, const std::string& loser,
-                      const Sources& sources);
+// "inhibited by …", "out: …": why one that had won does not any more, though it is active.
+std::string loss_text(const rules::ConnectionExplanation& loser, const Sources& sources);
 
 // What of the rules keeps it out, a line each, indented; of each behaviour at most so many lines,
 // and one that says how many more there are.

@@ -205,9 +205,19 @@ std::string WhySimulated::name_of(shm::SourceId winner) const {
   return winner == shm::kNone ? "idle" : simulation_.source_name(winner);
 }
 
-rules::PortExplanation WhySimulated::explain(shm::PortId port, const Sources& sources) const {
-  return explainer_.explain(simulation_.port_name(port),
-                            [&](const std::string& source) { return sources.is_active(source); });
+std::optional<rules::ConnectionExplanation> WhySimulated::explain(shm::PortId port,
+                                                                  const std::string& source,
+                                                                  const Sources& sources) const {
+  return explainer_.explain_connection(
+      simulation_.port_name(port), source,
+      [&](const std::string& each) { return sources.is_active(each); });
+}
+
+std::string WhySimulated::loss_of(shm::SourceId before, shm::PortId port,
+                                  const Sources& sources) const {
+  if (before == shm::kNone || !simulation_.is_active(before)) return {};
+  const auto loser = explain(port, simulation_.source_name(before), sources);
+  return loser ? loss_text(*loser, sources) : "";
 }
 
 void WhySimulated::tell_change(shm::PortId port, shm::SourceId before, shm::SourceId now,
@@ -219,7 +229,7 @@ void WhySimulated::tell_change(shm::PortId port, shm::SourceId before, shm::Sour
   const auto causes = rules::causes_of_change(
       simulation_.table(), port, [this](shm::SourceId source) { return was_active_[source]; },
       [this](shm::SourceId source) { return simulation_.is_active(source); });
-  const std::string loss = loss_text(explain(port, sources), name_of(before), sources);
+  const std::string loss = loss_of(before, port, sources);
   if (options_.json) {
     json because = json::array();
     for (const shm::SourceId cause : causes) {
@@ -257,19 +267,17 @@ void WhySimulated::tell_discarded(const rules::OutcomeRow& row, std::ostream& ou
   const auto port = static_cast<shm::PortId>(
       std::lower_bound(ports.begin(), ports.end(), row.port) - ports.begin());
   const Sources sources = sources_at(port);
-  const rules::PortExplanation explanation = explain(port, sources);
-  for (const auto& connection : explanation.connections) {
-    if (connection.source != row.event.source) continue;
-    if (options_.json) {
-      const json event{{"t_ns", row.event.at},
-                       {"port", row.port},
-                       {"event", "discarded"},
-                       {"connection", connection_json(connection, sources)}};
-      out << line_of(event, row.event.at);
-    } else {
-      out << time_of_now() << "  " << row.port << "  " << connection.source
-          << " discarded: " << first_cause(connection, sources) << '\n';
-    }
+  const auto connection = explain(port, row.event.source, sources);
+  if (!connection) return;  // the port only reads it
+  if (options_.json) {
+    const json event{{"t_ns", row.event.at},
+                     {"port", row.port},
+                     {"event", "discarded"},
+                     {"connection", connection_json(*connection, sources)}};
+    out << line_of(event, row.event.at);
+  } else {
+    out << time_of_now() << "  " << row.port << "  " << connection->source
+        << " discarded: " << first_cause(*connection, sources) << '\n';
   }
 }
 

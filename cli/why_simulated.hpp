@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <ostream>
 #include <set>
 #include <string>
@@ -80,7 +81,12 @@ class WhySimulated {
   void tell_discarded(const rules::OutcomeRow& row, std::ostream& out);
   [[nodiscard]] Sources sources_at(shm::PortId port) const;
   [[nodiscard]] std::string name_of(shm::SourceId winner) const;
-  [[nodiscard]] rules::PortExplanation explain(shm::PortId port, const Sources& sources) const;
+  [[nodiscard]] std::optional<rules::ConnectionExplanation> explain(shm::PortId port,
+                                                                    const std::string& source,
+                                                                    const Sources& sources) const;
+  // Of one that had won; empty where nobody had, or it is not active any more.
+  [[nodiscard]] std::string loss_of(shm::SourceId before, shm::PortId port,
+                                    const Sources& sources) const;
 
   const rules::Explainer explainer_;
   rules::Simulation& simulation_;

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "rules/explain/assume.hpp"
+#include "rules/model/evaluation.hpp"
 #include "rules/model/print_rules.hpp"
 #include "rules/model/provenance.hpp"
 #include "rules/model/quantifiers.hpp"
@@ -21,35 +22,44 @@ Element element(const Behaviour& behaviour) {
   return {behaviour.name, behaviour.is_meta, behaviour.where};
 }
 
-// Explains the connections of one port, under one activation.
+// Explains connections of one port, under one activation.
 class PortInquiry {
  public:
   PortInquiry(const RuleSet& rules, const std::string& port, const IsActive& is_active)
-      : rules_(rules), port_(port), is_active_(is_active), expansion_(rules.sources) {}
-
-  PortExplanation explain() {
-    PortExplanation result;
-    result.port = port_;
+      : rules_(rules), port_(port), is_active_(is_active), expansion_(rules.sources) {
     const auto at = std::find_if(rules_.ports.begin(), rules_.ports.end(),
                                  [&](const PortRules& each) { return each.port == port_; });
-    if (at != rules_.ports.end()) {
-      result.is_known = result.is_arbitrated = true;
-      result.first_wins = at->first_wins;
-      gather_parts();
-      winner_ = winner_of(*at);
-      for (const ConnectionRule& rule : at->rules) add(rule, *at, result);
-      add_senses(*at, result);
+    if (at == rules_.ports.end()) return;
+    arbiter_ = &*at;
+    winner_ = first_that_holds(is_active_, nullptr);
+  }
+
+  PortExplanation explain_all() {
+    PortExplanation result;
+    if (arbiter_ != nullptr) {
+      gather_parts(nullptr);
+      if (winner_ != nullptr) result.winner = winner_->source;
+      for (const ConnectionRule& rule : arbiter_->rules) result.connections.push_back(of(rule));
+      add_senses(result);
     }
     for (const Connection& connection : rules_.other_connections) {
-      if (connection.port != port_) continue;
-      result.is_known = true;
-      auto& added = result.connections.emplace_back();
-      added.source = connection.source;
-      added.is_active = is_active_(connection.source);
-      added.where = connection.where;
-      added.is_read = is_read(connection.source);
+      if (connection.port == port_) result.connections.push_back(of(connection));
     }
     return result;
+  }
+
+  std::optional<ConnectionExplanation> explain(const std::string& source) {
+    if (arbiter_ != nullptr) {
+      for (const ConnectionRule& rule : arbiter_->rules) {
+        if (rule.source != source) continue;
+        gather_parts(&source);
+        return of(rule);
+      }
+    }
+    for (const Connection& connection : rules_.other_connections) {
+      if (connection.port == port_ && connection.source == source) return of(connection);
+    }
+    return std::nullopt;
   }
 
  private:
@@ -69,37 +79,44 @@ class PortInquiry {
   };
 
   // Which behaviours configure a connection to the port, and which rules are written by hand.
-  void gather_parts() {
+  // `only`: of this source; null: of all.
+  void gather_parts(const std::string* only) {
     if (rules_.provenance == nullptr) return;
+    const auto is_wanted = [&](const auto& each) {
+      return each.port == port_ && (only == nullptr || each.source == *only);
+    };
     const Model& model = rules_.provenance->model;
     for (std::size_t b = 0; b < model.behaviours.size(); ++b) {
       for (const Config& config : model.behaviours[b].configs) {
-        if (config.port == port_) configs_[config.source].push_back({b, &config});
+        if (is_wanted(config)) configs_[config.source].push_back({b, &config});
       }
     }
     for (const Select& select : model.selects) {
-      if (select.port == port_) selects_[select.source] = &select;
+      if (is_wanted(select)) selects_[select.source] = &select;
     }
   }
 
-  [[nodiscard]] const std::string* winner_of(const PortRules& port) const {
-    const auto winner =
-        std::find_if(port.rules.begin(), port.rules.end(), [&](const ConnectionRule& rule) {
-          return is_active_(rule.source) && evaluate(*rule.condition, is_active_);
-        });
-    return winner == port.rules.end() ? nullptr : &winner->source;
+  // Of the rules before `end`, or of all; null: none holds.
+  [[nodiscard]] const ConnectionRule* first_that_holds(const IsActive& is_active,
+                                                       const ConnectionRule* end) const {
+    Evaluation evaluation([&](const std::string& source) { return truth(is_active(source)); });
+    for (const ConnectionRule& rule : arbiter_->rules) {
+      if (&rule == end) break;
+      if (is_active_(rule.source) && evaluation.of(*rule.condition) == Truth::kTrue) return &rule;
+    }
+    return nullptr;
   }
 
   // Who wins is what one sees: of several causes, each of which is enough, it stands in front.
   void put_winner_first(std::vector<Cause>& causes) const {
     if (winner_ == nullptr) return;
     std::stable_partition(causes.begin(), causes.end(), [&](const Cause& cause) {
-      return std::find(cause.because.begin(), cause.because.end(), Literal{*winner_, true}) !=
-             cause.because.end();
+      return std::find(cause.because.begin(), cause.because.end(),
+                       Literal{winner_->source, true}) != cause.because.end();
     });
   }
 
-  void add(const ConnectionRule& rule, const PortRules& rules, PortExplanation& port) {
+  ConnectionExplanation of(const ConnectionRule& rule) {
     ConnectionExplanation result;
     result.source = rule.source;
     result.has_rule = true;
@@ -109,31 +126,32 @@ class PortInquiry {
     const bool may_hold = std::any_of(result.parts.begin(), result.parts.end(),
                                       [](const Part& part) { return part.causes.empty(); });
     result.holds = result.is_active && may_hold;
-    if (result.holds && !port.winner) {
-      result.wins = true;
-      port.winner = rule.source;
-    } else if (may_hold) {
-      add_earlier(rule, rules, result);
-    }
-    port.connections.push_back(std::move(result));
+    result.wins = winner_ == &rule;
+    if (may_hold && !result.wins) add_earlier(rule, result);
+    return result;
+  }
+
+  ConnectionExplanation of(const Connection& connection) {
+    ConnectionExplanation result;
+    result.source = connection.source;
+    result.is_active = is_active_(connection.source);
+    result.where = connection.where;
+    result.is_read = is_read(connection.source);
+    return result;
   }
 
   // Where the rule's own source is active, it may end what keeps an earlier rule from holding, or
   // what lets it: all of them are asked once more.
-  void add_earlier(const ConnectionRule& rule, const PortRules& rules,
-                   ConnectionExplanation& result) const {
+  void add_earlier(const ConnectionRule& rule, ConnectionExplanation& result) const {
     const IsActive with_own = [&](const std::string& source) {
       return source == rule.source || is_active_(source);
     };
-    for (const ConnectionRule& earlier : rules.rules) {
-      if (&earlier == &rule) return;
-      if (!is_active_(earlier.source) || !evaluate(*earlier.condition, with_own)) continue;
-      result.earlier = earlier.source;
-      const ExpressionPtr whole =
-          make_operation(Operator::kAnd, {make_source(earlier.source), earlier.condition});
-      result.earlier_because = sufficient_reason(*assume_active(whole, rule.source), with_own);
-      return;
-    }
+    const ConnectionRule* const earlier = first_that_holds(with_own, &rule);
+    if (earlier == nullptr) return;
+    result.earlier = earlier->source;
+    const ExpressionPtr whole =
+        make_operation(Operator::kAnd, {make_source(earlier->source), earlier->condition});
+    result.earlier_because = sufficient_reason(*assume_active(whole, rule.source), with_own);
   }
 
   std::vector<Part> parts_of(const ConnectionRule& rule) {
@@ -187,7 +205,8 @@ class PortInquiry {
     cause.where = where;
     cause.of = of;
     if (kind == Cause::Kind::kConditionFalse) cause.condition = to_string(*written);
-    cause.because = sufficient_reason(*left, is_active_, winner_);
+    cause.because =
+        sufficient_reason(*left, is_active_, winner_ == nullptr ? nullptr : &winner_->source);
     const IsActive without_own = [this](const std::string& source) {
       return source != *own_ && is_active_(source);
     };
@@ -228,9 +247,10 @@ class PortInquiry {
     if (is_own_a_voice) {
       note_own_activity(cause);
     } else {
-      const auto winner = std::find_if(
-          voices.active.begin(), voices.active.end(),
-          [this](const Voice& voice) { return winner_ != nullptr && *voice.source == *winner_; });
+      const auto winner =
+          std::find_if(voices.active.begin(), voices.active.end(), [this](const Voice& voice) {
+            return winner_ != nullptr && *voice.source == winner_->source;
+          });
       const Voice& first = winner == voices.active.end() ? voices.active.front() : *winner;
       if (first.behaviour != inhibitor) {
         cause.speaker = element(rules_.provenance->model.behaviours[first.behaviour]);
@@ -277,28 +297,23 @@ class PortInquiry {
       read_.emplace();
       std::set<const Expression*> seen;
       for (const PortRules& port : rules_.ports) {
-        for (const ConnectionRule& rule : port.rules) collect(*rule.condition, seen, *read_);
+        for (const ConnectionRule& rule : port.rules) add_sources_of(*rule.condition, *read_, seen);
       }
     }
     return read_->count(source) != 0;
   }
 
-  void add_senses(const PortRules& port, PortExplanation& result) {
+  void add_senses(PortExplanation& result) const {
     std::set<std::string> sources;
     std::set<const Expression*> seen;
-    for (const ConnectionRule& rule : port.rules) collect(*rule.condition, seen, sources);
-    for (const ConnectionRule& rule : port.rules) sources.erase(rule.source);
+    for (const ConnectionRule& rule : arbiter_->rules) {
+      add_sources_of(*rule.condition, sources, seen);
+    }
+    for (const ConnectionRule& rule : arbiter_->rules) sources.erase(rule.source);
     for (const Connection& other : rules_.other_connections) {
       if (other.port == port_) sources.erase(other.source);
     }
     result.senses.assign(sources.begin(), sources.end());
-  }
-
-  static void collect(const Expression& expression, std::set<const Expression*>& seen,
-                      std::set<std::string>& sources) {
-    if (!seen.insert(&expression).second) return;
-    if (expression.op == Operator::kSource) sources.insert(expression.name);
-    for (const auto& operand : expression.operands) collect(*operand, seen, sources);
   }
 
   const RuleSet& rules_;
@@ -309,8 +324,9 @@ class PortInquiry {
   std::unordered_map<std::string, const Select*> selects_;             // by source
   std::unordered_map<std::size_t, Voices> voices_;                     // by behaviour
   std::optional<std::set<std::string>> read_;                          // by any rule
-  const std::string* winner_ = nullptr;  // the source that wins, if one does
-  const std::string* own_ = nullptr;     // source of the connection whose parts are looked at
+  const PortRules* arbiter_ = nullptr;      // none: the port is not arbitrated
+  const ConnectionRule* winner_ = nullptr;  // none: it is idle
+  const std::string* own_ = nullptr;        // source of the connection whose parts are looked at
   bool is_own_active_ = false;
 };
 
@@ -321,6 +337,7 @@ std::optional<std::vector<Literal>> ConnectionExplanation::reason() const {
   if (!has_rule) return std::vector<Literal>{};
   if (!is_active) return std::vector<Literal>{{source, false}};
   if (holds) return earlier_because;
+  // It is active and does not hold, so each part has a cause.
   std::map<std::string, bool> joined;
   for (const Part& part : parts) {
     const auto least = std::min_element(part.causes.begin(), part.causes.end(),
@@ -336,7 +353,12 @@ std::optional<std::vector<Literal>> ConnectionExplanation::reason() const {
 }
 
 PortExplanation Explainer::explain(const std::string& port, const IsActive& is_active) const {
-  return PortInquiry(rules_, port, is_active).explain();
+  return PortInquiry(rules_, port, is_active).explain_all();
+}
+
+std::optional<ConnectionExplanation> Explainer::explain_connection(
+    const std::string& port, const std::string& source, const IsActive& is_active) const {
+  return PortInquiry(rules_, port, is_active).explain(source);
 }
 
 std::vector<std::string> Explainer::ports() const {

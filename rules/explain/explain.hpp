@@ -81,10 +81,6 @@ struct ConnectionExplanation {
 };
 
 struct PortExplanation {
-  std::string port;
-  bool is_known = false;  // the model names it as an input port
-  bool is_arbitrated = false;
-  bool first_wins = false;
   std::optional<std::string> winner;
   std::vector<ConnectionExplanation> connections;  // in document order, those without rule last
   std::vector<std::string> senses;  // sources that the rules read and that are not connected
@@ -96,6 +92,9 @@ class Explainer {
   explicit Explainer(const RuleSet& rules) : rules_(rules) {}
 
   [[nodiscard]] PortExplanation explain(const std::string& port, const IsActive& is_active) const;
+  // One of its connections, for much less; nothing where the port does not have it.
+  [[nodiscard]] std::optional<ConnectionExplanation> explain_connection(
+      const std::string& port, const std::string& source, const IsActive& is_active) const;
 
   // The ports that the model names, for advice on a name that it does not.
   [[nodiscard]] std::vector<std::string> ports() const;

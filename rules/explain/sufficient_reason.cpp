@@ -10,20 +10,12 @@
 #include <set>
 #include <stdexcept>
 #include <unordered_map>
-#include <unordered_set>
 #include <utility>
 
 #include "rules/model/evaluation.hpp"
 
 namespace arbiter::rules {
 namespace {
-
-void collect_sources(const Expression& expression, std::unordered_set<const Expression*>& seen,
-                     std::set<std::string>& sources) {
-  if (!seen.insert(&expression).second) return;
-  if (expression.op == Operator::kSource) sources.insert(expression.name);
-  for (const auto& operand : expression.operands) collect_sources(*operand, seen, sources);
-}
 
 constexpr std::size_t kNoPlace = static_cast<std::size_t>(-1);
 
@@ -289,9 +281,9 @@ std::vector<Literal> large_reason(const Expression& expression,
 
 std::vector<Literal> sufficient_reason(const Expression& expression, const IsActive& is_active,
                                        const std::string* preferred) {
-  std::unordered_set<const Expression*> seen;
+  std::set<const Expression*> seen;
   std::set<std::string> sources;
-  collect_sources(expression, seen, sources);
+  add_sources_of(expression, sources, seen);
   std::vector<Literal> literals;
   literals.reserve(sources.size());
   std::size_t preferred_at = kNoPlace;

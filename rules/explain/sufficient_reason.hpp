@@ -1,4 +1,4 @@
-// Why an expression has the value that it has: the smallest part of an activation that is enough.
+// Why an expression has the value that it has: a small part of an activation that is enough.
 #pragma once
 
 #include <cstddef>
@@ -22,10 +22,15 @@ struct Literal {
 inline constexpr std::size_t kMaxSourcesForSmallest = 10;
 
 // What of the activation makes the expression as it is: while these stay as they are, nothing that
-// the other sources do changes it. In byte order; empty where no activation makes it otherwise. Of
-// the smallest possible size for expressions of up to kMaxSourcesForSmallest sources; of larger
-// ones a small one, but to find the smallest would take too long. Of several of one size, it is one
-// with `preferred` in it, where there is such a one; null: any.
+// the other sources do changes it. In byte order.
+//
+// For up to kMaxSourcesForSmallest sources it is of the smallest possible size: empty if no
+// activation makes the expression otherwise; and of several of that size one with `preferred` in
+// it, if there is one. Null: any.
+//
+// For more sources, finding that would take too long. The reason then follows the form of the
+// expression, and is small where that is simple. It may be larger than it need be, is not empty
+// even if the expression never changes, and may lack `preferred` though one as small has it.
 std::vector<Literal> sufficient_reason(const Expression& expression, const IsActive& is_active,
                                        const std::string* preferred = nullptr);
 

@@ -3,15 +3,6 @@
 #include <set>
 
 namespace arbiter::rules {
-namespace {
-
-// Conditions are no deeper than kMaxConditionDepth, hence recursion is fine here and below.
-void collect(const ExpressionPtr& expression, std::set<std::string>& names) {
-  if (expression->op == Operator::kSource) names.insert(expression->name);
-  for (const ExpressionPtr& operand : expression->operands) collect(operand, names);
-}
-
-}  // namespace
 
 bool matches(std::string_view pattern, std::string_view name) {
   // Only the last '*' ever needs to take more: what fits before it cannot fit better further on.
@@ -35,18 +26,22 @@ bool matches(std::string_view pattern, std::string_view name) {
 
 std::vector<std::string> collect_sources(const Model& model) {
   std::set<std::string> names;
+  std::set<const Expression*> seen;
   for (const SourceDeclaration& source : model.sources) names.insert(source.name);
   for (const Behaviour& behaviour : model.behaviours) {
     for (const Config& config : behaviour.configs) names.insert(config.source);
-    for (const Condition& condition : behaviour.conditions) collect(condition.expression, names);
+    for (const Condition& each : behaviour.conditions) {
+      add_sources_of(*each.expression, names, seen);
+    }
   }
   for (const Select& select : model.selects) {
     names.insert(select.source);
-    collect(select.condition, names);
+    add_sources_of(*select.condition, names, seen);
   }
   return {names.begin(), names.end()};
 }
 
+// Conditions are no deeper than kMaxConditionDepth, hence recursion is fine.
 ExpressionPtr QuantifierExpansion::expand(const ExpressionPtr& expression) {
   switch (expression->op) {
     case Operator::kAny:

@@ -112,8 +112,8 @@ TEST(Why, TellsThatSomethingWentInactiveAndMadeTheWinner) {
   EXPECT_EQ(since["changed"][0]["source"], "/high");
   EXPECT_EQ(since["changed"][0]["became"], "expired");
   EXPECT_EQ(since["at_least_ns"], since["changed"][0]["at_ns"]);
-  EXPECT_THAT(why({"/in"}), AllOf(HasSubstr("/low wins, since "),
-                                  HasSubstr(" ago: /high went inactive, 1 ms after its last")));
+  EXPECT_THAT(why({"/in"}), AllOf(HasSubstr("/low wins, for "),
+                                  HasSubstr(", since /high went inactive, 1 ms after its last")));
 }
 
 TEST(Why, TellsOfPortsThatAreNotOpenAndOfTypesThatDoNotFit) {

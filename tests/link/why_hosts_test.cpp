@@ -1,7 +1,9 @@
 // What `arbiter why` says of ports and sources of other hosts.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/mman.h>
 
+#include <sstream>
 #include <string>
 #include <utility>
 #include <vector>
@@ -19,6 +21,44 @@ using testing::AllOf;
 using testing::HasSubstr;
 
 class WhyOfHosts : public LoopbackHosts {};
+
+// What `arbiter why --follow --host` prints on base about a port of that host, until it has printed
+// one change.
+class FollowedPort {
+ public:
+  FollowedPort(const std::string& port, const std::string& host,
+               const std::vector<std::string>& more) {
+    std::vector<std::string> command{std::string(ARBITER_PROGRAMS) + "/arbiter",
+                                     "why",
+                                     port,
+                                     "--follow",
+                                     "--count",
+                                     "1",
+                                     "--host",
+                                     host,
+                                     "--instance",
+                                     "base"};
+    command.insert(command.end(), more.begin(), more.end());
+    program_ = ChildProcess(command, {}, {-1, seen_.get(), -1});
+  }
+  [[nodiscard]] std::string text() const {
+    return content_of("/proc/self/fd/" + std::to_string(seen_.get()));
+  }
+  void await_text(const std::string& what) const {
+    await([&] { return text().find(what) != std::string::npos; });
+  }
+  int wait() { return program_.wait(); }
+  [[nodiscard]] json line(std::size_t number) const {
+    std::istringstream lines(text());
+    std::string line;
+    for (std::size_t i = 0; i <= number; ++i) std::getline(lines, line);
+    return json::parse(line);
+  }
+
+ private:
+  const shm::FileDescriptor seen_{::memfd_create("followed", MFD_CLOEXEC)};
+  ChildProcess program_;
+};
 
 TEST_F(WhyOfHosts, WhyOfOneThatDoesNotHaveThePortOpenSaysSo) {
   Host head("head", runtime_, motor_model("1000s"), network());
@@ -47,6 +87,39 @@ TEST_F(WhyOfHosts, WhyOfOneThatDoesNotHaveThePortOpenSaysSo) {
       json::parse(run_arbiter("head", {"why", kMotor, "--host", "base", "--json"}).out);
   EXPECT_EQ(of_base["open"], true);
   EXPECT_EQ(of_base["nothing_comes_of_it"], nullptr);
+}
+
+// The same is said as without --follow, and in JSON each line is as of a port of this host.
+TEST_F(WhyOfHosts, WhoFollowsOneThatDoesNotHaveThePortOpenIsToldSo) {
+  Host head("head", runtime_, motor_model("1000s"), network());
+  Host base("base", runtime_, motor_model("1000s"), network());
+  Planner planner(head);
+  Body body(base);
+  body.drive(planner);
+  await_hosts("base", [](const wire::HostsDocument& hosts) {
+    const auto* const here = hosts.find_host("base");
+    return hosts.find_host("head") != nullptr && here != nullptr && here->inputs.size() == 1;
+  });
+  const FollowedPort text(kMotor, "head", {});
+  FollowedPort lines(kMotor, "head", {"--json"});
+  text.await_text("is not open on host head: /Planner/speed:o, by model 1;");
+  text.await_text("! it is open on host base, which decides it for its component");
+  lines.await_text("}\n");
+  const json first = lines.line(0);
+  EXPECT_EQ(first["open"], false);
+  EXPECT_EQ(first["mentioned"], true);
+  EXPECT_EQ(first["arbitrated"], true);
+  EXPECT_EQ(first["winner"], kPlanner);
+  planner.port().deactivate();
+  text.await_text("/Planner/speed:o -> idle  because /Planner/speed:o became inactive\n");
+  EXPECT_EQ(lines.wait(), 0);
+  const json change = lines.line(1);
+  EXPECT_EQ(change["old"], kPlanner);
+  EXPECT_EQ(change["winner"], nullptr);
+  EXPECT_EQ(change["because"], json::parse(R"([{"source": "/Planner/speed:o",
+                                               "became": "inactive", "at_ns": null}])"));
+  EXPECT_EQ(change["model"], nullptr);
+  EXPECT_EQ(change["old_loses"], nullptr);
 }
 
 TEST_F(WhyOfHosts, WhatHasBecomeOfASourceOnItsHostIsSaid) {
@@ -83,7 +156,7 @@ TEST_F(WhyOfHosts, WhatHasBecomeOfASourceOnItsHostIsSaid) {
     EXPECT_THAT(text, AllOf(HasSubstr(pub + " had it open, and died "), death)) << instance;
   }
   head.link().kill();
-  await_text("open any longer; host head, which it came from, is gone since ");
+  await_text("open any longer; host head, which it came from, has been gone for ");
 }
 
 TEST_F(WhyOfHosts, ASourceThatAComponentHereHadOpenSinceCameFromNoOtherHost) {

@@ -213,11 +213,24 @@ TEST_F(Explained, WhereTheFirstWinsTheOthersAreToldWhoWasFirst) {
   const auto low = connection(R"(<behaviors><arbiter at="/p" conflict="first">
 <select from="/high">/a or /b</select><select from="/low"/></arbiter></behaviors>)",
                               "/low", {"/low", "/high", "/b"});
-  EXPECT_TRUE(port_.first_wins);
   EXPECT_TRUE(low.holds);
   EXPECT_FALSE(low.wins);
   EXPECT_EQ(low.earlier, "/high");
   EXPECT_THAT(said(*low.reason()), ElementsAre("/b", "/high"));
+}
+
+TEST_F(Explained, OneConnectionIsExplainedWithoutTheOthers) {
+  const auto loaded = load_text(R"(<behaviors><arbiter at="/p" conflict="first">
+<select from="/high">/go</select><select from="/low">/other</select></arbiter></behaviors>)");
+  std::set<std::string> asked;
+  const auto high =
+      Explainer(loaded.rules).explain_connection("/p", "/high", [&](const std::string& source) {
+        asked.insert(source);
+        return source == "/high" || source == "/go";
+      });
+  ASSERT_TRUE(high);
+  EXPECT_TRUE(high->wins);
+  EXPECT_THAT(asked, ElementsAre("/go", "/high"));
 }
 
 TEST_F(Explained, AConditionThatNothingSatisfiesHasAnEmptyReason) {
@@ -239,10 +252,14 @@ TEST_F(Explained, AConnectionThatNoRuleSelectsSaysSo) {
   EXPECT_FALSE(port.connections[1].has_rule);
   EXPECT_THAT(*port.connections[1].reason(), IsEmpty());
   const auto free = explainer.explain("/free", all);
-  EXPECT_TRUE(free.is_known);
-  EXPECT_FALSE(free.is_arbitrated);
   EXPECT_EQ(free.connections.size(), 1u);
-  EXPECT_FALSE(explainer.explain("/nowhere", all).is_known);
+  EXPECT_FALSE(free.winner);
+  EXPECT_THAT(explainer.explain("/nowhere", all).connections, IsEmpty());
+  const auto other = explainer.explain_connection("/free", "/other", all);
+  ASSERT_TRUE(other);
+  EXPECT_FALSE(other->has_rule);
+  EXPECT_FALSE(explainer.explain_connection("/free", "/low", all));
+  EXPECT_FALSE(explainer.explain_connection("/nowhere", "/low", all));
   EXPECT_THAT(explainer.ports(), ElementsAre("/free", "/p"));
 }
 

@@ -110,6 +110,7 @@ class Explanations {
         EXPECT_EQ(connection.wins, explained.winner == connection.source);
         check_reason(port, connection, active);
         check_hypothesis(port, connection, active);
+        check_alone(port, connection, active);
         auto with_own = active;  // as in each decision on its arrivals
         with_own.insert(connection.source);
         for (const auto& part : connection.parts) {
@@ -127,6 +128,29 @@ class Explanations {
     return std::all_of(literals.begin(), literals.end(), [&](const rules::Literal& literal) {
       return active.contains(literal.source) == literal.active;
     });
+  }
+
+  // To ask for one connection is to ask for all and pick it.
+  void check_alone(const std::string& port, const rules::ConnectionExplanation& connection,
+                   const Active& active) {
+    const auto alone = explainer_.explain_connection(
+        port, connection.source,
+        [&](const std::string& source) { return active.contains(source); });
+    ASSERT_TRUE(alone);
+    EXPECT_EQ(alone->source, connection.source);
+    EXPECT_EQ(alone->is_active, connection.is_active);
+    EXPECT_EQ(alone->wins, connection.wins);
+    EXPECT_EQ(alone->earlier, connection.earlier);
+    EXPECT_EQ(alone->reason(), connection.reason());
+    ASSERT_EQ(alone->parts.size(), connection.parts.size());
+    for (std::size_t i = 0; i < alone->parts.size(); ++i) {
+      const auto& causes = connection.parts[i].causes;
+      EXPECT_TRUE(std::equal(causes.begin(), causes.end(), alone->parts[i].causes.begin(),
+                             alone->parts[i].causes.end(), [](const auto& left, const auto& right) {
+                               return left.kind == right.kind && left.because == right.because &&
+                                      left.also == right.also;
+                             }));
+    }
   }
 
   void check_reason(const std::string& port, const rules::ConnectionExplanation& connection,
