@@ -1,7 +1,7 @@
 #include "recording/message_index.hpp"
 
 #include <algorithm>
-#include <limits>
+#include <string>
 
 #include "recording/records.hpp"
 
@@ -9,17 +9,20 @@ namespace arbiter::recording {
 namespace {
 
 constexpr std::size_t kEntryBytes = 8 + 8;
+// Of one chunk. Compressed, more of them may take a file little; but readers that look for messages
+// by their index refuse a chunk without it.
+constexpr std::size_t kMostMessages = std::size_t{1} << 20;
 constexpr std::size_t kEmptyBytes = kHeadBytes + 2 + 4;
 
 }  // namespace
 
 void MessageIndex::add(const McapMessage& message, std::uint64_t at) {
-  const bool is_first = channels_.empty();
-  auto& entries = channels_[message.channel];
-  if (entries.size() >= std::numeric_limits<std::uint32_t>::max() / kEntryBytes) {
-    throw McapError("a chunk has too many messages for its index: make chunks smaller");
+  if (count_ >= kMostMessages) {
+    throw McapError("a chunk has more than " + std::to_string(kMostMessages) +
+                    " messages, which is too many for its index");
   }
-  entries.emplace_back(message.log_time, at);
+  const bool is_first = count_++ == 0;
+  channels_[message.channel].emplace_back(message.log_time, at);
   begin_ = is_first ? message.log_time : std::min(begin_, message.log_time);
   end_ = is_first ? message.log_time : std::max(end_, message.log_time);
 }

@@ -1,6 +1,7 @@
 // Where the messages of a chunk are: what stands behind it in the file, a record for each channel.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <map>
 #include <string>
@@ -14,7 +15,8 @@ namespace arbiter::recording {
 
 class MessageIndex {
  public:
-  // `at`: where its record begins in the records of its chunk.
+  // `at`: where its record begins in the records of its chunk. Throws McapError where there are too
+  // many.
   void add(const McapMessage& message, std::uint64_t at);
 
   // Of the log times; 0 without messages.
@@ -26,6 +28,7 @@ class MessageIndex {
 
  private:
   std::map<std::uint16_t, std::vector<std::pair<McapTime, std::uint64_t>>> channels_;
+  std::size_t count_ = 0;
   McapTime begin_ = 0;
   McapTime end_ = 0;
 };

@@ -47,12 +47,17 @@ OutputFile::OutputFile(const std::string& path, Unfinished unfinished)
 }
 
 OutputFile::~OutputFile() {
-  if (fd_ >= 0) ::close(fd_);
+  if (fd_ < 0) return;
+  if (unfinished_ == Unfinished::discard) unlink_mine();
+  ::close(fd_);
 }
 
-void OutputFile::discard() noexcept {
-  if (fd_ >= 0) ::close(std::exchange(fd_, -1));
-  ::unlink(path_.c_str());
+// Somebody may have put another file there.
+bool OutputFile::unlink_mine() noexcept {
+  struct stat mine {};
+  struct stat there {};
+  return ::fstat(fd_, &mine) == 0 && ::lstat(path_.c_str(), &there) == 0 &&
+         mine.st_dev == there.st_dev && mine.st_ino == there.st_ino && ::unlink(path_.c_str()) == 0;
 }
 
 void OutputFile::refuse(const std::string& what, const std::string& reason) const {
@@ -76,8 +81,8 @@ void OutputFile::fail(const char* what, int error) {
     [[maybe_unused]] const int truncated = ::ftruncate(fd_, static_cast<off_t>(bytes_));
     ended_ += ". It ends after the last whole record, at byte " + std::to_string(bytes_);
   } else {
-    discard();
-    ended_ += "; it was deleted";
+    if (unlink_mine()) ended_ += "; it was deleted";
+    ::close(std::exchange(fd_, -1));
   }
   ended_ += advice_for(error);
   throw_error(error, text_of(what, ended_));
@@ -108,7 +113,6 @@ void OutputFile::require_untouched() {
                ? "somebody has deleted it meanwhile"
                : "somebody else has written to it, or cut it: it has " + std::to_string(size) +
                      " bytes, and " + std::to_string(bytes_) + " were written";
-  if (unfinished_ == Unfinished::discard && found.st_nlink != 0) discard();
   refuse("write", ended_);
 }
 
@@ -124,12 +128,11 @@ void OutputFile::sync() {
 void OutputFile::close() {
   require_open("write");
   require_untouched();
-  const int fd = std::exchange(fd_, -1);
-  // Where the file is another machine's, this is when a quota may be exceeded.
-  if (::close(fd) == 0 || errno == EINTR) return;
-  const int error = errno;
-  ended_ = std::strerror(error);
-  throw_error(error, text_of("write", ended_));
+  // Where the file is another machine's, this is when a quota may be exceeded: a second descriptor
+  // is told of it while there is one to end the file by.
+  const int second = ::fcntl(fd_, F_DUPFD_CLOEXEC, 0);
+  if (second >= 0 && ::close(second) != 0 && errno != EINTR) fail("write", errno);
+  ::close(std::exchange(fd_, -1));
 }
 
 }  // namespace arbiter::recording

@@ -25,8 +25,6 @@ class OutputFile {
   // Returns when a power cut cannot take what was written.
   void sync();
   void close();
-  // Closes it, and deletes it.
-  void discard() noexcept;
   // For mistakes of the caller, which are about this file all the same.
   [[noreturn]] void refuse(const std::string& what, const std::string& reason) const;
 
@@ -39,6 +37,8 @@ class OutputFile {
   // Says what could not be done, and ends the file.
   [[noreturn]] void fail(const char* what, int error);
   void require_untouched();
+  // False: it is not there any more.
+  bool unlink_mine() noexcept;
 
   std::string path_;
   Unfinished unfinished_;

@@ -74,6 +74,50 @@ TEST_F(Repair, TouchesNoFileThatIsThere) {
   EXPECT_EQ(content_of_file(sample_), content_);
 }
 
+TEST_F(Repair, LeavesNothingWhereItIsStopped) {
+  const auto stop = [](std::uint64_t done, std::uint64_t) {
+    if (done > 200) throw McapError("stopped");
+  };
+  EXPECT_THROW(repair_mcap(sample_, to_, "mender", recording::kMaxChunkBytes, stop), McapError);
+  EXPECT_FALSE(std::filesystem::exists(to_));
+}
+
+// Compressed, they would take the file little, and their index the disk and memory much.
+TEST_F(Repair, RefusesMoreMessagesInAChunkThanOneMayHave) {
+  std::string file(recording::kMagic);
+  recording::append_header(file, "", "another");
+  recording::append_channel(file, 7, {0, "/a", "raw", {}});
+  std::string records;
+  constexpr std::size_t kMost = std::size_t{1} << 20;
+  for (std::size_t i = 0; i <= kMost; ++i) recording::append_message(records, message(7, 1, ""));
+  std::string chunk;
+  recording::append<std::uint64_t>(chunk, 1'001);
+  recording::append<std::uint64_t>(chunk, 1'001);
+  recording::append<std::uint64_t>(chunk, records.size());
+  recording::append<std::uint32_t>(chunk, 0);
+  recording::append_string(chunk, "");
+  recording::append<std::uint64_t>(chunk, records.size());
+  recording::append_record(file, recording::Opcode::chunk, chunk + records);
+  try {
+    repair_mcap(directory_.write("from.mcap", file), to_, "mender");
+    ADD_FAILURE() << "it was repaired";
+  } catch (const McapError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("has more than 1048576 messages"));
+  }
+  EXPECT_FALSE(std::filesystem::exists(to_));
+}
+
+TEST_F(Repair, DeletesNoFileOfSomebodyElse) {
+  const auto replace = [&](std::uint64_t done, std::uint64_t) {
+    if (done < 200) return;
+    std::filesystem::remove(to_);
+    directory_.write("to.mcap", "mine");
+    throw McapError("stopped");
+  };
+  EXPECT_THROW(repair_mcap(sample_, to_, "mender", recording::kMaxChunkBytes, replace), McapError);
+  EXPECT_EQ(content_of_file(to_), "mine");
+}
+
 // Another writer's file: messages outside of chunks, no indexes, declarations within chunks.
 TEST_F(Repair, CountsWhatStandsOutsideOfChunks) {
   std::string file(recording::kMagic);
