@@ -8,6 +8,8 @@
 
 #include <CLI/CLI.hpp>
 
+#include "cli/first_output.hpp"
+#include "cli/model_files.hpp"
 #include "cli/output_file.hpp"
 #include "cli/progress.hpp"
 #include "cli/recording_compile.hpp"
@@ -21,8 +23,16 @@ struct ExportOptions {
   std::string file;
   std::string trace;
   std::string csv;
+  double effort = 1;
   bool replaces = false;
 };
+
+void warn_of_restarts(const evidence::Recorded& recorded) {
+  if (recorded.runs.size() < 2) return;
+  std::cerr
+      << "arbiter: warning: a daemon came that knew nothing of what was active, which a trace "
+         "cannot say: in it each activity goes on until its T is over\n";
+}
 
 int export_recording(const ExportOptions& options) {
   if (options.trace.empty() && options.csv.empty()) {
@@ -43,15 +53,21 @@ int export_recording(const ExportOptions& options) {
               << "; what comes before is exported\n";
   }
   warn_of_missed(recorded);
-  evidence::Models models(recording_compiler(1));
-  const auto write = [&](const std::string& path, const auto& writer) {
-    if (path.empty()) return;
+  evidence::Models models(recording_compiler(options.effort));
+  const auto content_by = [&](const auto& writer) {
     std::ostringstream text;
     writer(recorded, models, text);
-    write_output(path, text.str());
+    return text.str();
   };
-  write(options.trace, evidence::write_trace);
-  write(options.csv, evidence::write_decisions);
+  const auto write_csv = [&] {
+    if (!options.csv.empty()) write_output(options.csv, content_by(evidence::write_decisions));
+  };
+  if (options.trace.empty()) {
+    write_csv();
+  } else {
+    warn_of_restarts(recorded);
+    write_first(options.trace, content_by(evidence::write_trace), write_csv);
+  }
   return 0;
 }
 
@@ -67,6 +83,7 @@ void add_export(CLI::App& parent, int& exit_code) {
   verb->add_option("--csv", options->csv,
                    "What was decided live, in the form that `arbiter simulate` prints")
       ->type_name("FILE");
+  add_effort_option(*verb, options->effort);
   add_force_option(*verb, options->replaces);
   verb->footer(
       "Example:\n  arbiter recording export incident.mcap --trace trace.csv --csv decisions.csv\n\n"

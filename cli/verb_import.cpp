@@ -10,6 +10,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "cli/first_output.hpp"
 #include "cli/numbers.hpp"
 #include "cli/output_file.hpp"
 #include "cli/verbs.hpp"
@@ -156,8 +157,12 @@ int import(ImportVerbOptions options) {
   if (has_mapping) read_back(rules::TextFile(options.mapping, mapping), problems);
   if (!problems.empty()) return say_problems(problems);
   make_directory(options.directory);
-  if (has_mapping) write_output(options.mapping, mapping);
-  write_output(options.output, model);
+  const auto write_model = [&] { write_output(options.output, model); };
+  if (has_mapping) {
+    write_first(options.mapping, mapping, write_model);
+  } else {
+    write_model();
+  }
   return 0;
 }
 

@@ -127,6 +127,25 @@ TEST(Import, ReplacesNoFileUnlessItIsToldTo) {
   EXPECT_EQ(arbiter({"import", "twist_mux", yaml, "-o", "/dev/null"}).exit_code, 0);
 }
 
+// The command, once it is corrected, must not be refused for what was left of the first.
+TEST(Import, LeavesNoMappingOfAModelThatCannotBeWritten) {
+  TemporaryDirectory directory;
+  const auto yaml = directory.write("mux.yaml", kMux);
+  const std::string mapping = directory.file("map.xml");
+  const std::vector<std::string> verb{
+      "import", "twist_mux", yaml, "-o", directory.file("no-such/m.xml"), "--mapping", mapping};
+  auto result = arbiter(verb);
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_THAT(result.err, HasSubstr("cannot write "));
+  EXPECT_FALSE(std::filesystem::exists(mapping));
+  // What was there before is not deleted.
+  directory.write("map.xml", "mine");
+  std::vector<std::string> forced = verb;
+  forced.emplace_back("--force");
+  EXPECT_EQ(arbiter(forced).exit_code, 2);
+  EXPECT_TRUE(std::filesystem::exists(mapping));
+}
+
 // A gateway refuses zeros of a type that has strings, or whose size nobody knows.
 TEST(Import, WritesNoMappingThatAGatewayWouldRefuse) {
   TemporaryDirectory directory;

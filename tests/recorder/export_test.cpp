@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <filesystem>
 #include <sstream>
 
 #include <nlohmann/json.hpp>
@@ -219,6 +220,64 @@ TEST(Export, ReplacesAFileIfItIsToldTo) {
   EXPECT_EQ(arbiter({"recording", "export", incident.file(), "--csv", there, "--force"}).exit_code,
             0);
   EXPECT_EQ(content_of(there), "t_ns,source,destination,decision,winner\n");
+}
+
+TEST(Export, SaysWhatATraceCannotSay) {
+  const TemporaryDirectory directory;
+  Incident incident;
+  incident.arrive("/low", 1100, 1101, Incident::Fate::accepted);
+  EXPECT_EQ(arbiter({"recording", "export", incident.file(), "--trace", "/dev/null"}).err, "");
+  incident.add(evidence::Start{1250, "test", {}, "none"});
+  incident.put_in_force(kOverride, 1, 1200);
+  const std::string file = incident.file();
+  EXPECT_EQ(arbiter({"recording", "export", file, "--trace", "/dev/null"}).err,
+            "arbiter: warning: a daemon came that knew nothing of what was active, which a trace "
+            "cannot say: in it each activity goes on until its T is over\n");
+  EXPECT_EQ(arbiter({"recording", "export", file, "--csv", "/dev/null"}).err, "");
+}
+
+TEST(Export, LeavesNoTraceWhereTheOtherFileCannotBeWritten) {
+  const TemporaryDirectory directory;
+  Incident incident;
+  const std::string trace = directory.file("trace.csv");
+  EXPECT_EQ(arbiter({"recording", "export", incident.file(), "--trace", trace, "--csv",
+                     directory.file("no-such/decisions.csv")})
+                .exit_code,
+            2);
+  EXPECT_FALSE(std::filesystem::exists(trace));
+}
+
+// Nine pigeons in eight holes: to find out that there is no room takes more steps than the least
+// effort has.
+std::string hard_model() {
+  std::string rule = "true";
+  const auto sits = [](int pigeon, int hole) {
+    return "/x" + std::to_string(pigeon) + '_' + std::to_string(hole);
+  };
+  for (int pigeon = 0; pigeon < 9; ++pigeon) {
+    rule += " and (false";
+    for (int hole = 0; hole < 8; ++hole) rule += " or " + sits(pigeon, hole);
+    rule += ")";
+    for (int hole = 0; hole < 8; ++hole) {
+      for (int other = 0; other < pigeon; ++other) {
+        rule += " and not (" + sits(pigeon, hole) + " and " + sits(other, hole) + ")";
+      }
+    }
+  }
+  return "<behaviors timeout='500ns'><arbiter at='/p'><select from='/low'>" + rule +
+         "</select></arbiter></behaviors>";
+}
+
+TEST(Export, ProvesModelsWithTheEffortThatItIsGiven) {
+  Incident incident(hard_model(), {"/low"});
+  incident.arrive("/low", 1100, 1101, Incident::Fate::accepted);
+  const std::string file = incident.file();
+  const auto result = [&](const char* effort) {
+    return arbiter({"recording", "export", file, "--csv", "/dev/null", "--effort", effort});
+  };
+  EXPECT_EQ(result("1").exit_code, 0) << result("1").err;
+  EXPECT_EQ(result("0.001").exit_code, 1);
+  EXPECT_THAT(result("0.001").err, testing::HasSubstr("allow more steps with --effort"));
 }
 
 TEST(Export, NeedsToKnowWhat) {
