@@ -46,10 +46,9 @@ void include(std::optional<RecordingInfo::Times>& times, McapTime time) {
 // that is too large.
 nlohmann::json record_of(evidence::RecordKind kind, const recording::McapChannel& channel,
                          const recording::McapMessage& message) {
-  constexpr std::size_t kMostBytes = std::size_t{64} << 10;
   const auto& topic = evidence::record_schemas[static_cast<std::size_t>(kind)].topic;
   if (channel.topic != topic || channel.message_encoding != "json" ||
-      message.data.size() > kMostBytes) {
+      message.data.size() > evidence::max_record_bytes(kind)) {
     return nullptr;
   }
   return nlohmann::json::parse(message.data, nullptr, false);

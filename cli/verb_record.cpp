@@ -97,21 +97,21 @@ void write_summary(const recorder::Recorded& recorded, const std::string& file,
   std::cout << out.str();
 }
 
-evidence::RecordingInfo info_of(const std::string& instance) {
+evidence::RecordingInfo info_of(const recorder::RecorderOptions& settings) {
   evidence::RecordingInfo info;
   info.program = "arbiter " ARBITER_VERSION;
-  info.instance = instance;
+  info.instance = settings.caller.instance;
   info.host = watch::host_name();
   info.command = typed_command();
   info.wall_offset = evidence::wall_offset_now();
+  info.say = settings.say;
   return info;
 }
 
 int record_into_file(const RecordOptions& options, const recorder::RecorderOptions& settings,
                      shm::Nanoseconds end) {
   const auto interrupts = catch_interrupts();
-  recorder::FileSink sink(options.out, {compression_of(options.compression)},
-                          info_of(settings.caller.instance));
+  recorder::FileSink sink(options.out, {compression_of(options.compression)}, info_of(settings));
   try {
     recorder::Recorder recorder(settings, sink);
     std::cerr << "arbiter: recording " + rules::counted(recorder.taps(), "source") + " into " +
@@ -144,8 +144,7 @@ int record(RecordOptions& options) {
   if (options.flight.span == 0) return record_into_file(options, settings, end);
   options.flight.prefix = options.out;
   options.flight.end = end;
-  return fly(options.flight, settings, {compression_of(options.compression)},
-             info_of(settings.caller.instance));
+  return fly(options.flight, settings, {compression_of(options.compression)}, info_of(settings));
 }
 
 // 64MiB, 500KiB, 1GiB.

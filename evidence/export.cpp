@@ -159,9 +159,12 @@ class DecisionRows {
 
 void write_trace(const Recorded& recorded, Models& models, std::ostream& out) {
   out << "t_ns,source,event\n";
+  Nanoseconds last = 0;
   for (const Run& run : recorded.runs) {
     for (const TraceRow& row : trace_of(run, models)) {
-      out << row.time << ',' << rules::to_csv(*row.source) << ','
+      // What is active as a run begins may have arrived while the run before was told.
+      last = std::max(last, row.time);
+      out << last << ',' << rules::to_csv(*row.source) << ','
           << (row.is_deactivation ? "deactivate" : "arrive") << '\n';
     }
   }

@@ -2,6 +2,7 @@
 
 #include <charconv>
 #include <optional>
+#include <string>
 
 #include <nlohmann/json.hpp>
 
@@ -237,10 +238,29 @@ Record read_missed(const Fields& in) {
   return each;
 }
 
+// Names, values, and where objects and lists begin and end: of a model, some for each file.
+constexpr std::size_t kMostParts = std::size_t{64} << 10;
+
+json parse_record(RecordKind kind, std::string_view text) {
+  if (text.size() > max_record_bytes(kind)) {
+    throw RecordError("it has " + std::to_string(text.size()) + " bytes, more than the " +
+                      std::to_string(max_record_bytes(kind)) + " that it may have");
+  }
+  if (kind != RecordKind::kModel) return json::parse(text, nullptr, false);
+  std::size_t parts = 0;
+  const auto judge = [&parts](int /*depth*/, json::parse_event_t /*event*/, json& /*parsed*/) {
+    if (++parts > kMostParts) {
+      throw RecordError("it has more than " + std::to_string(kMostParts) + " parts");
+    }
+    return true;
+  };
+  return json::parse(text, judge, false);
+}
+
 }  // namespace
 
 Record read_record(RecordKind kind, std::string_view text, Contexts& contexts) {
-  const json object = json::parse(text, nullptr, false);
+  const json object = parse_record(kind, text);
   if (!object.is_object()) throw RecordError("it is not a JSON object");
   const Fields in(object);
   switch (kind) {

@@ -31,6 +31,12 @@ struct RecordSchema {
 
 extern const std::array<RecordSchema, kRecordKinds> record_schemas;  // by kind
 
+// What a record may have, for what parsing makes of its text may be many times as large: a model
+// has the texts of its files, the others have at most some lists of destinations.
+constexpr std::size_t max_record_bytes(RecordKind kind) {
+  return std::size_t{kind == RecordKind::kModel ? 64u : 1u} << 20;
+}
+
 // Payloads have channels of their own: the topic is the source, the schema's name its type.
 inline constexpr std::string_view kPayloadEncoding = "x-arbiter-bytes";
 // Of the metadata record that each recording begins with.

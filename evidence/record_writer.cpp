@@ -7,6 +7,7 @@
 #include <span>
 #include <string_view>
 #include <type_traits>
+#include <utility>
 
 #include "evidence/activity_json.hpp"
 #include "shm/clock.hpp"
@@ -229,7 +230,7 @@ std::int64_t wall_offset_now() {
 
 RecordWriter::RecordWriter(const std::string& path, const recording::McapOptions& options,
                            const RecordingInfo& info)
-    : file_(path, info.program, options), wall_offset_(info.wall_offset) {
+    : file_(path, info.program, options), wall_offset_(info.wall_offset), say_(info.say) {
   file_.write_metadata(std::string(kMetadataName),
                        {{"format", std::string(kFormat)},
                         {"instance", info.instance},
@@ -244,14 +245,39 @@ RecordWriter::RecordWriter(const std::string& path, const recording::McapOptions
   }
 }
 
+Arrival without_payload(const Arrival& from) {
+  return {from.context, from.time,       from.seen, from.is_sample, from.sequence,
+          from.size,    from.generation, from.word, from.masks,     from.origin};
+}
+
 void RecordWriter::write(const Record& record) {
+  const auto* arrival = std::get_if<Arrival>(&record);
+  if (arrival == nullptr || !arrival->payload) return write_record(record);
+  const std::uint16_t channel = channel_of(*arrival->context);
+  if (channel == 0) return leave_out_payload(*arrival);
+  write_record(record);
+  // Directly behind its arrival.
+  const recording::McapTime wall = as_wall(arrival->time, wall_offset_);
+  file_.write({channel, static_cast<std::uint32_t>(arrival->sequence), wall, wall,
+               std::span(*arrival->payload)});
+}
+
+void RecordWriter::write_record(const Record& record) {
   JsonLine line(json_);
   const Written written = std::visit([&](const auto& each) { return put(line, each); }, record);
   line.end();
   if (const auto* start = std::get_if<Start>(&record)) start_ = start->time;
   write_json(written.kind, written.time, json_);
-  const auto* arrival = std::get_if<Arrival>(&record);
-  if (arrival != nullptr && arrival->payload) write_payload(*arrival);
+}
+
+void RecordWriter::leave_out_payload(const Arrival& arrival) {
+  const std::string text = "the file has payloads of as many sources and types as it can";
+  const std::string& source = arrival.context->source;
+  if (!std::exchange(is_full_, true) && say_) {
+    say_(text + ": those of " + source + " are left out, and of all other types that come");
+  }
+  write_record(Missed{source, arrival.time, arrival.time, 0, 1, Missed::Why::too_large, text});
+  write_record(without_payload(arrival));
 }
 
 void RecordWriter::close(Nanoseconds end) {
@@ -261,37 +287,40 @@ void RecordWriter::close(Nanoseconds end) {
 
 void RecordWriter::write_json(RecordKind kind, Nanoseconds time, const std::string& json) {
   const auto index = static_cast<std::size_t>(kind);
+  if (json.size() > max_record_bytes(kind)) {
+    throw recording::McapError("a record of topic " + std::string(record_schemas[index].topic) +
+                               " has " + std::to_string(json.size()) +
+                               " bytes, more than anybody reads");
+  }
   // What was so before, such as the model, is in the recording from its start.
   const recording::McapTime wall = as_wall(std::max(time, start_), wall_offset_);
   const auto number = static_cast<std::uint32_t>(counts_[index]++);
   file_.write({channels_[index], number, wall, wall, std::as_bytes(std::span(json))});
 }
 
-// Directly behind its arrival.
-void RecordWriter::write_payload(const Arrival& arrival) {
-  const recording::McapTime wall = as_wall(arrival.time, wall_offset_);
-  file_.write({channel_of(*arrival.context), static_cast<std::uint32_t>(arrival.sequence), wall,
-               wall, std::span(*arrival.payload)});
-}
-
+// 0: the file has no room for one more.
 std::uint16_t RecordWriter::channel_of(const SourceContext& context) {
   const std::string size = std::to_string(context.size);
   const std::string alignment = std::to_string(context.alignment);
   const std::string key = context.source + '\n' + context.type + '\n' + size + '\n' + alignment;
-  const auto [known, is_new] = payload_channels_.try_emplace(key, 0);
-  if (!is_new) return known->second;
-  std::uint16_t schema = 0;
-  if (!context.type.empty()) {
-    const auto [type, is_new_type] = types_.try_emplace(context.type, 0);
-    if (is_new_type) type->second = file_.add_schema({context.type, "", ""});
-    schema = type->second;
+  const auto known = payload_channels_.find(key);
+  if (known != payload_channels_.end()) return known->second;
+  if (is_full_) return 0;
+  try {
+    std::uint16_t schema = 0;
+    if (!context.type.empty()) {
+      const auto [type, is_new_type] = types_.try_emplace(context.type, 0);
+      if (is_new_type) type->second = file_.add_schema({context.type, "", ""});
+      schema = type->second;
+    }
+    return payload_channels_[key] = file_.add_channel(
+               {schema,
+                context.source,
+                std::string(kPayloadEncoding),
+                {{"type", context.type}, {"size", size}, {"alignment", alignment}}});
+  } catch (const recording::McapError&) {  // neither writes, so it is not the disk
+    return 0;
   }
-  known->second =
-      file_.add_channel({schema,
-                         context.source,
-                         std::string(kPayloadEncoding),
-                         {{"type", context.type}, {"size", size}, {"alignment", alignment}}});
-  return known->second;
 }
 
 }  // namespace arbiter::evidence

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <string>
 #include <unordered_map>
@@ -21,7 +22,12 @@ struct RecordingInfo {
   // Added to a time of CLOCK_MONOTONIC gives nanoseconds since 1970. One for the whole file: where
   // the wall clock is set meanwhile, the times of the file go on evenly.
   std::int64_t wall_offset = 0;
+  // For people, a sentence each: what the file has no room for, once.
+  std::function<void(const std::string&)> say{};
 };
+
+// Copies no payload.
+[[nodiscard]] Arrival without_payload(const Arrival& from);
 
 // The offset as it is now.
 [[nodiscard]] std::int64_t wall_offset_now();
@@ -32,6 +38,7 @@ class RecordWriter {
   RecordWriter(const std::string& path, const recording::McapOptions& options,
                const RecordingInfo& info);
 
+  // Where the file has no room for the payloads of one more source or type, their arrivals say so.
   void write(const Record& record);
   // What was written until now survives a kill of this process; with sync(), a power cut.
   void end_chunk() { file_.end_chunk(); }
@@ -45,18 +52,21 @@ class RecordWriter {
 
  private:
   void write_json(RecordKind kind, Nanoseconds time, const std::string& json);
-  void write_payload(const Arrival& arrival);
+  void write_record(const Record& record);
+  void leave_out_payload(const Arrival& arrival);
   std::uint16_t channel_of(const SourceContext& context);
 
   recording::McapWriter file_;
   std::int64_t wall_offset_;
+  std::function<void(const std::string&)> say_;
   Nanoseconds start_ = 0;  // of the recording
   std::uint16_t channels_[kRecordKinds]{};
   std::uint64_t counts_[kRecordKinds]{};
   std::map<std::string, std::uint16_t> types_;  // schemas of payloads
   // By source and type: a successor may have another type.
   std::map<std::string, std::uint16_t> payload_channels_;
-  std::string json_;  // its memory is used again
+  bool is_full_ = false;  // it takes no more of these
+  std::string json_;      // its memory is used again
 };
 
 }  // namespace arbiter::evidence

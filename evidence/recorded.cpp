@@ -39,12 +39,19 @@ class Loader {
   Run& run() { return runs_.back(); }
 
   // Until the recorder notices that a daemon has come with memory of its own, taps tell of that
-  // memory already. Of what decided there, the run before knows nothing.
+  // memory already. Of what was done there, the run before knows nothing. Without a model in force
+  // it is not known since when the memory is there; nor is anything decided then.
   static void leave_out_strangers(Run& run, const Run& next) {
     if (next.models.empty()) return;
-    const Nanoseconds begun = next.models.begin()->second.time;
+    const ModelChange& first = next.models.begin()->second;
+    if (first.generation == 0 || first.time == 0) return;
+    for (auto& [source, history] : run.sources) {
+      const auto is_strange = [&](const Step& step) { return step.time >= first.time; };
+      auto& steps = history.steps;
+      steps.erase(std::find_if(steps.begin(), steps.end(), is_strange), steps.end());
+    }
     run.left_out += std::erase_if(
-        run.decisions, [&](const Decision& each) { return each.arrival().time >= begun; });
+        run.decisions, [](const Decision& each) { return each.step >= each.source->steps.size(); });
   }
 
   // Each takes effect after the one before.

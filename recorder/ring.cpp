@@ -34,11 +34,9 @@ struct Shares {
 };
 Shares shares_of(std::size_t memory) { return {memory / 2, memory / 4}; }
 
-// Copies no payload.
-RecordPtr without_payload(const evidence::Arrival& from) {
+RecordPtr bare(const Record& arrival) {
   return std::make_shared<const Record>(
-      evidence::Arrival{from.context, from.time, from.seen, from.is_sample, from.sequence,
-                        from.size, from.generation, from.word, from.masks, from.origin});
+      evidence::without_payload(std::get<evidence::Arrival>(arrival)));
 }
 
 SourceState state_of(const evidence::ContextPtr& context, Nanoseconds time, Nanoseconds seen,
@@ -107,7 +105,7 @@ void Ring::write(const RecordPtr& record) {
 void Ring::add(const RecordPtr& record) {
   const std::size_t payload = evidence::payload_size_of(*record);
   if (payload > shares_of(options_.memory).payload) {
-    records_.push_back({without_payload(std::get<evidence::Arrival>(*record)), true});
+    records_.push_back({bare(*record), true});
   } else {
     if (payload != 0) payloads_.push_back(forgotten_ + records_.size());
     payload_bytes_ += payload;
@@ -140,7 +138,7 @@ void Ring::drop_oldest_payload() {
   Kept& kept = records_[payloads_.front() - forgotten_];
   payloads_.pop_front();
   const std::size_t payload = evidence::payload_size_of(*kept.record);
-  kept = {without_payload(std::get<evidence::Arrival>(*kept.record)), true};
+  kept = {bare(*kept.record), true};
   bytes_ -= payload;
   payload_bytes_ -= payload;
 }

@@ -262,6 +262,53 @@ TEST(Records, ThatNobodyCouldHaveWrittenAreRefused) {
             ": record 1, of topic arbiter/deactivation: its field \"source\" is not a text");
 }
 
+// Parsing makes many times as much memory of a text.
+TEST(Records, ThatWouldTakeMuchMemoryAreNotParsed) {
+  const TemporaryDirectory directory;
+  const auto error = [&](const std::string& topic, const std::string& text) {
+    const std::string what = error_of_reading(file_with(directory, topic, text));
+    return what.substr(what.rfind(": ") + 2);
+  };
+  std::string lists = "{\"files\":[";
+  for (int i = 0; i < 70'000; ++i) lists += "[],";
+  lists += "[]]}";
+  EXPECT_EQ(error("arbiter/missed", std::string(1'048'577, ' ')),
+            "it has 1048577 bytes, more than the 1048576 that it may have");
+  EXPECT_EQ(error("arbiter/model", std::string(67'108'865, ' ')),
+            "it has 67108865 bytes, more than the 67108864 that it may have");
+  EXPECT_EQ(error("arbiter/model", lists), "it has more than 65536 parts");
+  EXPECT_EQ(error("arbiter/missed", std::string(1'048'576, ' ')), "it is not a JSON object");
+  EXPECT_EQ(error("arbiter/model", std::string(1'048'577, ' ')), "it is not a JSON object");
+}
+
+TEST(Records, ThatNobodyWouldReadAreNotWritten) {
+  const TemporaryDirectory directory;
+  evidence::RecordWriter writer(directory.file("new.mcap"), {}, {});
+  const std::vector<std::string> ports(5'000, std::string(250, 'p'));
+  EXPECT_THROW(writer.write(evidence::Start{1'000, "test", ports, "none"}), recording::McapError);
+  writer.write(evidence::Start{1'000, "test", {}, "none"});
+  writer.close();
+  EXPECT_EQ(read_all(directory.file("new.mcap")).records.size(), 1u);
+}
+
+// All destinations that there may be, with the longest names, of characters that JSON makes long.
+TEST(Records, MayBeAsLargeAsAnyThatIsRecorded) {
+  Incident incident;
+  auto context = std::make_shared<evidence::SourceContext>();
+  context->source = "/low";
+  for (char port = 0; port < 64; ++port) {
+    context->destinations.push_back(std::string(254, '\x1f') + static_cast<char>('0' + port));
+  }
+  incident.add(evidence::DestinationsChange{context, 1040, 1041});
+  evidence::Arrival arrival;
+  arrival.context = context;
+  arrival.time = arrival.seen = 1050;
+  const std::uint64_t all = ~std::uint64_t{0};
+  arrival.masks = {all, all, all, all};
+  incident.add(arrival);
+  EXPECT_NO_THROW(static_cast<void>(incident.read()));
+}
+
 // A later version may know more reasons.
 TEST(Records, OfWhatIsMissingAreReadWhateverTheReason) {
   const TemporaryDirectory directory;

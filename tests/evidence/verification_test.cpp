@@ -114,6 +114,19 @@ TEST(Verification, PassesOverWhatADaemonDecidedThatKnowsNothingOfTheRun) {
   EXPECT_EQ(verified.recorded.runs[1].left_out, 0u);
 }
 
+// Of the memory that comes next it is not known since when it is there.
+TEST(Verification, LeavesNothingOutWhereNoModelIsInForceNext) {
+  Incident incident;
+  incident.arrive("/high", 1010, 1011, Fate::accepted);
+  incident.arrive("/low", 1020, 1021, Fate::discarded);
+  incident.add(evidence::Start{1250, "test", {}, "none"});
+  incident.state("/low", 0, 1249, shm::kNeverActive);
+  incident.add(evidence::ModelChange{});
+  const Verified verified(incident);
+  EXPECT_EQ(verified.result.equal, 2u);
+  EXPECT_EQ(verified.recorded.runs[0].left_out, 0u);
+}
+
 TEST(Verification, CountsWhatWasDecidedByAModelThatIsNotThere) {
   Incident incident;
   incident.arrive("/low", 1010, 1011, Fate::accepted);
