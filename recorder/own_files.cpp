@@ -49,15 +49,15 @@ OwnFiles::OwnFiles(std::string prefix, std::size_t most) : prefix_(std::move(pre
   read_list();
 }
 
-bool OwnFiles::is_there(const File& file) {
+std::optional<OwnFiles::File> OwnFiles::seen(const std::string& path) {
   struct stat now {};
-  return ::lstat(file.path.c_str(), &now) == 0 && S_ISREG(now.st_mode) &&
-         now.st_dev == file.device && now.st_ino == file.inode;
+  if (::lstat(path.c_str(), &now) != 0 || !S_ISREG(now.st_mode)) return std::nullopt;
+  return File{path, now.st_dev, now.st_ino, now.st_size,
+              std::int64_t{now.st_mtim.tv_sec} * 1'000'000'000 + now.st_mtim.tv_nsec};
 }
 
 std::vector<std::string> OwnFiles::add(const std::string& path) {
-  struct stat made {};
-  if (::lstat(path.c_str(), &made) == 0) files_.push_back({path, made.st_dev, made.st_ino});
+  if (auto made = seen(path)) files_.push_back(std::move(*made));
   forget_those_gone();
   std::vector<std::string> removed;
   while (files_.size() > most_) {
@@ -78,10 +78,11 @@ std::string OwnFiles::remove_oldest() {
 }
 
 void OwnFiles::forget_those_gone() {
-  std::erase_if(files_, [](const File& file) { return !is_there(file); });
+  std::erase_if(files_, [](const File& file) { return seen(file.path) != file; });
 }
 
-// A line for each: its device, its inode, and its name in the directory of the list.
+// A line for each: its device, inode, size and time, and its name in the directory of the list. A
+// line of an older recorder lacks two of these, and is passed over.
 void OwnFiles::read_list() {
   const std::string directory = directory_of(prefix_);
   const std::string beginning = prefix_.substr(directory.size()) + "-";
@@ -90,12 +91,14 @@ void OwnFiles::read_list() {
     std::istringstream words(line);
     File file;
     std::string name;
-    if (!(words >> file.device >> file.inode) || !std::getline(words >> std::ws, name)) continue;
+    const bool is_read = words >> file.device >> file.inode >> file.size >> file.modified &&
+                         std::getline(words >> std::ws, name);
+    if (!is_read) continue;
     const bool is_name = name.starts_with(beginning) && name.ends_with(".mcap") &&
                          name.find('/') == std::string::npos;
     if (!is_name) continue;
     file.path = directory + name;
-    if (is_there(file)) files_.push_back(std::move(file));
+    if (seen(file.path) == file) files_.push_back(std::move(file));
   }
 }
 
@@ -106,6 +109,7 @@ void OwnFiles::write_list() const {
   std::string text;
   for (const File& file : files_) {
     text += std::to_string(file.device) + ' ' + std::to_string(file.inode) + ' ' +
+            std::to_string(file.size) + ' ' + std::to_string(file.modified) + ' ' +
             file.path.substr(directory) + '\n';
   }
   ::unlink(next.c_str());  // of a recorder that was killed

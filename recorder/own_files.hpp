@@ -3,13 +3,16 @@
 //
 // It knows its own by a list beside them, PREFIX.files, so that those of an earlier run count too.
 // What is not in the list, or is not the file any more that was listed, it never touches: a file
-// that somebody has moved away is theirs.
+// that somebody has moved away is theirs. Nor what the list of an older recorder has, which does
+// not say enough to know it again.
 #pragma once
 
 #include <sys/types.h>
 
 #include <cstddef>
+#include <cstdint>
 #include <deque>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -31,9 +34,15 @@ class OwnFiles {
     std::string path;
     dev_t device = 0;
     ino_t inode = 0;
+    // A file that was removed leaves its inode to the next one. They do not change any more.
+    off_t size = 0;
+    std::int64_t modified = 0;  // nanoseconds
+
+    bool operator==(const File&) const = default;
   };
 
-  [[nodiscard]] static bool is_there(const File& file);
+  // As it is there now.
+  [[nodiscard]] static std::optional<File> seen(const std::string& path);
   void forget_those_gone();
   void read_list();
   void write_list() const;

@@ -25,6 +25,9 @@ constexpr Nanoseconds kPortsAtLeastEvery = 2'000'000'000;
 // a daemon.
 constexpr Nanoseconds kTryAgainAfter = 1'000'000'000;
 constexpr Nanoseconds kTryAgainAtLeastEvery = 32'000'000'000;
+// Until it has begun again, nothing is recorded.
+constexpr Nanoseconds kBeginAgainAfter = 20'000'000;
+constexpr Nanoseconds kBeginAtLeastEvery = 2'000'000'000;
 
 // What a component writes into its page may be anything. Only a kind of activity and a time that
 // has come are written down: by the kind the others decide.
@@ -95,16 +98,24 @@ void Watcher::look() {
   look_at_ports();
 }
 
-// Where that fails, because the new daemon is busy with others, it is tried at the next look.
+// Where that fails, because the new daemon is busy with others, say, it is tried again.
 void Watcher::begin_again() {
+  const Nanoseconds now = shm::monotonic_now();
+  if (!instance_->has_daemon() || now < next_begin_) return;
   if (memory_ != nullptr) {
     options_.say("a daemon has come that does not know what was before: recording starts again");
   }
   try {
     begin();
-  } catch (...) {
+    begin_pause_ = 0;
+  } catch (const std::exception& error) {
     memory_.reset();
-    throw;
+    if (begin_pause_ == 0) {
+      options_.say(std::string("recording has not started again; it is tried again: ") +
+                   error.what());
+    }
+    begin_pause_ = std::clamp(2 * begin_pause_, kBeginAgainAfter, kBeginAtLeastEvery);
+    next_begin_ = now + begin_pause_;
   }
 }
 
@@ -128,7 +139,8 @@ void Watcher::begin() {
   const bool has_tap = std::any_of(sources_.begin(), sources_.end(),
                                    [](const auto& each) { return each.second.tap != nullptr; });
   const std::vector<std::string> refused = take_refusals();
-  if (!has_tap && !refused.empty()) throw Error(refused.front());
+  if (!has_begun_ && !has_tap && !refused.empty()) throw Error(refused.front());
+  has_begun_ = true;
   for (const std::string& text : refused) options_.say(text);
   Batch states;
   for (auto& [source, watched] : sources_) {

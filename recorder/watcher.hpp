@@ -90,6 +90,10 @@ class Watcher {
   std::unique_ptr<watch::Instance> instance_;
   std::shared_ptr<const shm::DecisionMemory> memory_;  // of this run
   std::optional<Node> node_;
+  bool has_begun_ = false;  // a recorder that may tap nothing does not; later it may again
+  // After which it begins again, and when; 0: the last time it could.
+  Nanoseconds begin_pause_ = 0;
+  Nanoseconds next_begin_ = 0;
   std::uint64_t generation_ = 0;
   std::vector<std::pair<std::string, std::string>> refusals_;  // sources, and why; not reported yet
   struct Watched {

@@ -324,58 +324,6 @@ TEST(Record, TakesUpASourceOnceItCanBeTapped) {
   EXPECT_EQ(result["equal"], 2) << result.dump(2);
 }
 
-TEST(Record, BeginsAgainWhereADaemonKnowsNothing) {
-  Daemon daemon(kOverrideModel);
-  Recording recording(daemon);
-  daemon.kill();
-  daemon.lose_state();
-  daemon.restart();
-  recording.see("recording starts again");
-  await([&] { return recording.records<evidence::Start>().size() >= 2; });
-  Node node("test");
-  auto low = node.output_port<int>("/low");
-  auto in = node.input_port<int>("/p");
-  while (recording.records<Arrival>().empty()) {  // opening waits for the tap, but not for ever
-    low.publish(1);
-  }
-  EXPECT_EQ(recording.end(), 0) << recording.error();
-  const json result = recording.simulate();
-  EXPECT_EQ(result["equal"], recording.records<Arrival>().size()) << result.dump(2);
-}
-
-// What they do from then on, who obeys them does; and nothing tells the recorder of it.
-TEST(Record, SaysOfWhomItCannotRecordBehindADaemonThatDoesNotKnowThem) {
-  Daemon daemon(kOverrideModel);
-  Node node("nav");
-  auto low = node.output_port<int>("/low");
-  auto other = node.output_port<int>("/other");
-  Recording recording(daemon, {"--port", "/p"});
-  low.publish(1);
-  daemon.kill();
-  daemon.lose_state();
-  daemon.restart();
-  recording.see("cannot record /low of component nav (pid " + std::to_string(getpid()) +
-                "): it goes on by the memory of a daemon before, and this one does not know it; "
-                "start it again\n");
-  EXPECT_EQ(recording.end(), 0) << recording.error();
-  EXPECT_THAT(recording.error(), Not(HasSubstr("/other")));
-  const auto missed = recording.records<evidence::Missed>();
-  ASSERT_EQ(missed.size(), 1u) << "once, however often it is seen";
-  EXPECT_EQ(missed[0].source, "/low");
-  EXPECT_EQ(missed[0].why, evidence::Missed::Why::stranger);
-  const auto starts = recording.records<evidence::Start>();
-  ASSERT_EQ(starts.size(), 2u);
-  EXPECT_LE(missed[0].from, starts[1].time);
-  EXPECT_GT(missed[0].from, starts[0].time);
-  const auto info = arbiter({"recording", "info", recording.file()});
-  EXPECT_THAT(info.out, HasSubstr("\nsources that were not recorded, at least for a while\n"
-                                  "  /low: of component nav (pid "));
-  const auto about = json::parse(arbiter({"recording", "info", "--json", recording.file()}).out);
-  ASSERT_EQ(about["unrecorded"].size(), 1u);
-  EXPECT_EQ(about["unrecorded"][0]["source"], "/low");
-  EXPECT_EQ(about["unrecorded"][0]["why"], "stranger");
-}
-
 TEST(Record, SaysWhatIsWrong) {
   Daemon daemon(kOverrideModel);
   const std::string file = daemon.directory() + "/there.mcap";

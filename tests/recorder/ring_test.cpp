@@ -13,7 +13,6 @@
 
 #include "evidence/verification.hpp"
 #include "recorder/dump_socket.hpp"
-#include "recorder/own_files.hpp"
 #include "shm/clock.hpp"
 #include "tests/recorder/fed_ring.hpp"
 #include "tests/support/other_user.hpp"
@@ -232,36 +231,6 @@ TEST_F(RingTest, LeavesNoPartOfAFileThatCannotBeWritten) {
   tick(ring, kSecond);
   EXPECT_EQ(told_.back().error, "");
   EXPECT_TRUE(recording::read_mcap(told_.back().file, {}).is_whole);
-}
-
-// In a directory that others may write to, the list may be made up.
-TEST(OwnFiles, ForgetsWhatAListSaysOfOthers) {
-  const TemporaryDirectory directory;
-  std::filesystem::create_directory(directory.file("below"));
-  std::string list;
-  std::vector<std::string> others;
-  for (const char* name :
-       {"other-1.mcap", "flight-1.csv", "below/../flight-2.mcap", "below/flight-3.mcap"}) {
-    const std::string path = directory.write(name, "x");
-    struct stat there {};
-    if (::lstat(path.c_str(), &there) != 0) continue;
-    others.push_back(path);
-    list += std::to_string(there.st_dev) + ' ' + std::to_string(there.st_ino) + ' ' + name + '\n';
-  }
-  const std::string own = directory.write("flight-5.mcap", "x");
-  struct stat there {};
-  ASSERT_EQ(::lstat(own.c_str(), &there), 0);
-  list += std::to_string(there.st_dev) + ' ' + std::to_string(there.st_ino) + " flight-5.mcap\n";
-  const std::string planted = directory.write("planted", list + "no line\n1\n");
-  std::filesystem::create_symlink(planted, directory.file("flight.files"));
-  const std::string prefix = directory.file("flight");
-  const std::string first = directory.write("flight-6.mcap", "x");
-  EXPECT_TRUE(recorder::OwnFiles(prefix, 1).add(first).empty()) << "a link is no list";
-  std::filesystem::remove(directory.file("flight.files"));
-  std::filesystem::copy_file(planted, directory.file("flight.files"));
-  const std::string second = directory.write("flight-7.mcap", "x");
-  EXPECT_EQ(recorder::OwnFiles(prefix, 1).add(second), std::vector<std::string>{own});
-  for (const std::string& other : others) EXPECT_TRUE(std::filesystem::exists(other)) << other;
 }
 
 // Whoever asks is answered with what was written for that, and with nothing else.
