@@ -108,6 +108,12 @@ int replay(const ReplayVerb& verb) {
     std::cout << rules::counted(replayed.without_payload, "sample")
               << " whose payload is not in the recording became signals\n";
   }
+  if (replayed.of_another_type != 0) {
+    const auto& changed = replayed.changed;
+    std::cout << rules::counted(replayed.of_another_type, "sample")
+              << " of another type than the last of "
+              << rules::enumerate({changed.begin(), changed.end()}) << " became signals\n";
+  }
   return replayed.was_interrupted ? interrupted_exit_code(interrupts) : 0;
 }
 

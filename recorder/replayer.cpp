@@ -11,6 +11,7 @@
 #include "rules/model/load.hpp"
 #include "rules/model/quantifiers.hpp"
 #include "rules/prove/compile.hpp"
+#include "rules/text/names.hpp"
 #include "shm/clock.hpp"
 #include "shm/picture.hpp"
 
@@ -41,6 +42,14 @@ std::string advice_for(const std::string& refusal, const std::string& port) {
   const bool is_taken = refusal.find(" is held by ") != std::string::npos;
   return std::string(is_taken ? ". Stop that component, choose" : ". Choose") +
          " other sources with --source, or replay into an instance of its own with --instance";
+}
+
+// By the rule of ports (Type).
+bool have_one_type(const evidence::SourceContext& one, const evidence::SourceContext& other) {
+  if (one.type != other.type) return false;
+  const bool is_variable = one.alignment == 0;
+  return one.type.empty() ||
+         (one.alignment == other.alignment && (is_variable || one.size == other.size));
 }
 
 std::optional<rules::CompiledModel> compiled(const evidence::ModelChange& model) {
@@ -97,10 +106,14 @@ void Replayer::survey(const Record& record) {
   const auto* context = evidence::context_of(record);
   if (context == nullptr) return;
   Source& source = sources_[context->source];
-  if (context->size != 0) {
-    source.type = context->type;
-    source.size = context->size;
-    source.alignment = context->alignment;
+  const auto* arrival = std::get_if<Arrival>(&record);
+  const bool has_payload = arrival != nullptr && arrival->has_payload;
+  // That of its last payload; if it has none, the last that was told.
+  const bool tells_type = context->size != 0 && (has_payload || source.payloads == 0);
+  if (tells_type && !have_one_type(source.type, *context)) {
+    source.type = *context;
+  } else if (tells_type) {
+    source.type.size = std::max(source.type.size, context->size);
   }
   for (const std::string& port : context->destinations) {
     auto& all = sources_of_ports_[port];
@@ -108,10 +121,10 @@ void Replayer::survey(const Record& record) {
       all.push_back(context->source);
     }
   }
-  if (const auto* arrival = std::get_if<Arrival>(&record)) {
+  if (arrival != nullptr) {
     source.has_events = true;
     source.samples += arrival->is_sample ? 1 : 0;
-    source.payloads += arrival->has_payload ? 1 : 0;
+    source.payloads += has_payload ? 1 : 0;
     source.largest = std::max(source.largest, arrival->size);
     source.word = arrival->word;
     latest_ = std::max(latest_, arrival->time);
@@ -166,14 +179,11 @@ void Replayer::refuse_without_payloads() const {
 }
 
 void Replayer::open_port(const std::string& name, Source& source) {
-  OutputPortOptions options;
-  if (source.type.empty()) {
-    options.max_size = std::max(source.largest, source.size);
-    source.port.emplace(node_->output_port(name, options));
-  } else {
-    source.port.emplace(
-        node_->output_port(name, Type(source.type, source.size, source.alignment), options));
-  }
+  const evidence::SourceContext& type = source.type;
+  const bool has_one_size = !type.type.empty() && type.alignment != 0;
+  const std::uint64_t size = has_one_size ? type.size : std::max(source.largest, type.size);
+  source.port.emplace(node_->output_port(
+      name, type.type.empty() ? Type::untyped(size) : Type(type.type, size, type.alignment), {}));
 }
 
 void Replayer::open_ports() {
@@ -243,25 +253,36 @@ Nanoseconds Replayer::due(Nanoseconds recorded) const {
   return std::max(last_, start_ + at_speed(recorded - first_, options_.speed));
 }
 
-// A recording begins in the middle of activities. Those that end by themselves end when they did.
+// A recording begins in the middle of activities. Those that end by themselves end when they did;
+// where that is not known they last too long, rather than that those drive whom they keep out.
 void Replayer::signal_active_ones() {
+  std::vector<std::string> unknown;
   for (auto& [name, source] : sources_) {
     if (!shm::is_active(source.at_start, first_)) continue;
     const bool is_forever = !shm::is_finite(source.at_start);
-    const Nanoseconds arrived =
-        is_forever ? first_ : shm::arrival_of(source.at_start, source.timeout);
-    const bool is_known = is_forever || (source.timeout != shm::kForever && arrived <= first_);
-    if (!is_known) continue;
-    try {
-      if (keeps_times_ && options_.speed == 1) {
-        source.port->signal_at(time_at(start_ - (first_ - arrived)));
-        continue;
-      }
-    } catch (const Error&) {  // somebody had the source meanwhile
+    Nanoseconds arrived = is_forever ? first_ : shm::arrival_of(source.at_start, source.timeout);
+    if (!is_forever && (source.timeout == shm::kForever || arrived > first_)) {
+      unknown.push_back(name);
+      arrived = first_;
     }
-    source.port->signal();
-    last_ = shm::monotonic_now() + 1;  // what follows comes later
+    signal_active(source, arrived);
   }
+  if (unknown.empty()) return;
+  options_.say("the recording does not have the T of " + rules::enumerate(unknown) +
+               " from before its start: the replay begins with a signal there, and that activity "
+               "may last longer than it did");
+}
+
+void Replayer::signal_active(Source& source, Nanoseconds arrived) {
+  try {
+    if (keeps_times_ && options_.speed == 1) {
+      source.port->signal_at(time_at(start_ - (first_ - arrived)));
+      return;
+    }
+  } catch (const Error&) {  // somebody had the source meanwhile
+  }
+  source.port->signal();
+  last_ = shm::monotonic_now() + 1;  // what follows comes later
 }
 
 void Replayer::publish(const Record& record, Replayed& replayed) {
@@ -286,11 +307,15 @@ void Replayer::publish(const Record& record, Replayed& replayed) {
 
 void Replayer::arrive(Source& source, const Arrival& arrival, Nanoseconds at, Replayed& replayed) {
   OutputPort<void>& port = *source.port;
-  const bool fits_port =
-      arrival.payload && (source.type.empty() ? arrival.payload->size() <= port.max_size()
-                                              : arrival.payload->size() == port.max_size());
-  if (!fits_port) {
-    ++(arrival.is_sample ? replayed.without_payload : replayed.signals);
+  const std::size_t size = arrival.payload ? arrival.payload->size() : 0;
+  const bool has_type =
+      have_one_type(source.type, *arrival.context) &&
+      (port.type().has_one_size() ? size == port.max_size() : size <= port.max_size());
+  if (!arrival.payload || !has_type) {
+    if (arrival.payload) replayed.changed.insert(arrival.context->source);
+    ++(arrival.payload     ? replayed.of_another_type
+       : arrival.is_sample ? replayed.without_payload
+                           : replayed.signals);
     if (keeps_times_) {
       port.signal_at(time_at(at));
     } else {

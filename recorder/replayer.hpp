@@ -10,6 +10,7 @@
 #include <functional>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -36,6 +37,8 @@ struct Replayed {
   std::uint64_t signals = 0;
   std::uint64_t deactivations = 0;
   std::uint64_t without_payload = 0;  // samples that became signals
+  std::uint64_t of_another_type = 0;  // than the source's last sample, and so the port: the same
+  std::set<std::string> changed{};    // the sources of these
   std::size_t sources = 0;
   evidence::Nanoseconds time = 0;
   evidence::Nanoseconds latest = 0;  // how late a call came, at most
@@ -68,10 +71,8 @@ class Replayer {
   using Nanoseconds = evidence::Nanoseconds;
 
   struct Source {
-    std::string type;
-    std::uint64_t size = 0;
-    std::uint64_t alignment = 1;
-    std::uint64_t largest = 1;  // sample
+    evidence::SourceContext type;  // its port's; of it, nothing else counts
+    std::uint64_t largest = 1;     // sample
     std::uint64_t samples = 0;
     std::uint64_t payloads = 0;
     bool has_events = false;
@@ -91,6 +92,7 @@ class Replayer {
   void open_port(const std::string& name, Source& source);
   void open_ports();
   void signal_active_ones();
+  void signal_active(Source& source, Nanoseconds arrived);
   void deactivate_untold(Nanoseconds recorded, const shm::FileDescriptor& interrupts,
                          Replayed& replayed);
   void await(Nanoseconds recorded, const shm::FileDescriptor& interrupts);

@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <array>
 #include <chrono>
 #include <filesystem>
 #include <map>
@@ -165,6 +166,63 @@ TEST_F(Replay, RefusesWhatHasNoPayload) {
   EXPECT_THAT(result.err, HasSubstr("does not have what was in the samples of /low, /text"));
   result = arbiter({"replay", file, "--source", "/high", "--as-fast-as-possible"});
   EXPECT_EQ(result.exit_code, 0) << result.err;
+}
+
+// A port has one type at a time; a sample is never published as what it is not.
+TEST_F(Replay, MakesSignalsOfSamplesOfAnotherType) {
+  Node node("test");
+  Recording recording(daemon_, {"--payloads", "all"});
+  node.output_port<Number>("/low").publish(Number{1});
+  const Type other("test/Other", sizeof(Number), alignof(Number));
+  {
+    auto low = node.output_port("/low", other);
+    low.publish(Bytes(std::array<std::byte, sizeof(Number)>{}.data(), sizeof(Number)));
+  }
+  node.output_port<Number>("/low").signal();
+  EXPECT_EQ(recording.end(), 0) << recording.error();
+  auto tap = node.tap("/low");
+  const auto result = arbiter({"replay", recording.file(), "--as-fast-as-possible"});
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.out, HasSubstr("1 sample, 1 signal and 0 deactivations of 1 source in "));
+  EXPECT_THAT(result.out,
+              HasSubstr("\n1 sample of another type than the last of /low became signals\n"));
+  EXPECT_THAT(result.out, testing::Not(HasSubstr("whose payload is not in the recording")));
+  std::vector<Type> types;
+  while (const auto event = tap.take()) {
+    if (event->sample()) types.push_back(event->type());
+  }
+  EXPECT_EQ(types, std::vector<Type>{other});
+}
+
+TEST_F(Replay, PublishesSamplesOfAnySizeAgain) {
+  Node node("test");
+  Recording recording(daemon_, {"--payloads", "all"});
+  {
+    auto low = node.output_port("/low", Type::variable("test/Text", 16));
+    for (const std::size_t size : {3u, 16u}) {
+      low.publish(Bytes(std::array<std::byte, 16>{}.data(), size));
+    }
+  }
+  EXPECT_EQ(recording.end(), 0) << recording.error();
+  const auto result = arbiter({"replay", recording.file()});
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.out, HasSubstr("2 samples, 0 signals and 0 deactivations of 1 source in "));
+}
+
+// Else those that it keeps out would drive.
+TEST_F(Replay, BeginsWithASourceWhoseTIsNotInTheRecording) {
+  Incident incident("no model", {"/low"});
+  incident.state("/high", 900, 990, shm::arrival(900, 500));
+  incident.deactivate("/low", 1010, 1011);
+  Node node("test");
+  auto tap = node.tap("/high");
+  const auto result = arbiter({"replay", incident.file()});
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.err, HasSubstr("the recording does not have the T of /high from before its "
+                                    "start: the replay begins with a signal there"));
+  bool has_arrived = false;
+  while (const auto event = tap.take()) has_arrived |= event->kind() == TapEventKind::signal;
+  EXPECT_TRUE(has_arrived);
 }
 
 TEST_F(Replay, UnderstandsTheFormerNameOfItsSpeed) {
