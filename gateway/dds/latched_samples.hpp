@@ -14,9 +14,13 @@
 
 namespace arbiter::gateway::dds {
 
-// A reference of ours to what Cyclone has, or had: bytes that do not change any more.
+// A reference of ours to what Cyclone has, or had; or, without operations, a payload that Cyclone
+// never had: bytes that do not change any more.
 struct GiveBack {
-  void operator()(Payload* payload) const noexcept { ddsi_serdata_unref(&payload->cyclone); }
+  void operator()(Payload* payload) const noexcept {
+    if (payload->cyclone.ops == nullptr) return PayloadPool::of_process().give_back(payload);
+    ddsi_serdata_unref(&payload->cyclone);
+  }
 };
 using LastSample = std::unique_ptr<Payload, GiveBack>;
 

@@ -10,6 +10,19 @@
 
 namespace arbiter::gateway::dds {
 
+namespace {
+
+// Null: no memory; then nothing is kept, rather than what was sent before.
+LastSample keep_unsent(Bytes sample) noexcept {
+  Payload* const copy = draft_payload(sample.size());
+  if (copy == nullptr) return nullptr;
+  std::memcpy(copy->bytes(), sample.data(), sample.size());
+  copy->cyclone.ops = nullptr;
+  return LastSample(copy);
+}
+
+}  // namespace
+
 OutTopic::OutTopic(const Entry& entry, Account& account, const Bell& bell)
     : EndPoint(End::kWriter, entry, account),
       bell_(bell),
@@ -109,10 +122,7 @@ void OutTopic::drop_draft() noexcept {
 }
 
 std::optional<Sender::Result> OutTopic::obstacle(Bytes sample) noexcept {
-  if (!is_open()) {
-    if (has_idle_sample_) last_.reset();  // the idle sample, or the next one, follows
-    return Result::kNotReady;
-  }
+  if (!is_open() && has_idle_sample_) last_.reset();  // the idle sample, or the next one, follows
   const Encapsulation encapsulation = read_encapsulation(sample);
   const bool is_xcdr2 = representation_ == Representation::kXcdr2;
   if (encapsulation.encoding != (is_xcdr2 ? Encoding::kXcdr2 : Encoding::kXcdr1)) {
@@ -121,9 +131,13 @@ std::optional<Sender::Result> OutTopic::obstacle(Bytes sample) noexcept {
                   ": who publishes it must send what DDS would (docs/dds.md)");
   }
   const auto& size = topic().size;
-  if (!size || may_have(encapsulation, sample.size() - kEncapsulationBytes, *size)) return {};
-  account().set_last_reason(wrong_size(sample.size()));
-  return Result::kUnreadable;
+  if (size && !may_have(encapsulation, sample.size() - kEncapsulationBytes, *size)) {
+    account().set_last_reason(wrong_size(sample.size()));
+    return Result::kUnreadable;
+  }
+  if (is_open()) return {};
+  if (latches() && !has_idle_sample_) last_ = keep_unsent(sample);
+  return Result::kNotReady;
 }
 
 Sender::Result OutTopic::write(Payload& payload) noexcept {

@@ -61,7 +61,8 @@ class OutTopic : public EndPoint, public Sender {
   const Representation representation_;
   const ddsi_sertype* type_ = nullptr;
   const bool has_idle_sample_;
-  LastSample last_;  // that was sent, if the entry latches; with in_use()
+  // That was sent, or was to be sent while this was closed, if the entry latches; with in_use().
+  LastSample last_;
   // Of whoever has the entry's turn, as is note() of the next one.
   Payload* draft_ = nullptr;
   bool is_draft_begun_ = false;  // Cyclone counts references to it

@@ -125,6 +125,21 @@ TEST_F(Latched, WhatWasSentLastIsStillThereWhenTheWriterIsOpenedAgain) {
   EXPECT_THAT(given(), testing::ElementsAre(one_));
 }
 
+// A pause that has ended meanwhile must not come back.
+TEST_F(Latched, WhatWasToBeSentWhileTheWriterWasClosedIsThereWhenItIsOpen) {
+  make("qos='latched'");
+  EXPECT_EQ(send(one_), Sender::Result::kSent);
+  topic_->close();
+  EXPECT_EQ(send(two_), Sender::Result::kNotReady);
+  EXPECT_EQ(send("no header"), Sender::Result::kRefused);
+  open_again();
+  EXPECT_THAT(given(), testing::ElementsAre(two_));
+  topic_->close();
+  EXPECT_EQ(send(one_), Sender::Result::kNotReady);
+  begin_anew();
+  EXPECT_THAT(given(), testing::ElementsAre(one_));
+}
+
 TEST_F(Latched, WhatIsNotLatchedIsNot) {
   make("");
   EXPECT_EQ(send(one_), Sender::Result::kSent);
