@@ -1,7 +1,6 @@
 // What all ports of a node see of the daemon: the tables, and the activity of sources.
 #pragma once
 
-#include <cstddef>
 #include <memory>
 #include <utility>
 
@@ -39,7 +38,7 @@ class SharedMemory : public shm::DecisionMemory {
   SharedMemory(shm::FileDescriptor board, shm::FileDescriptor registry,
                std::shared_ptr<const ServiceBell> service_bell,
                shm::Residence residence = shm::Residence::kMapped)
-      : DecisionMemory(std::move(board), residence, kMaxPageDescriptors),
+      : DecisionMemory(std::move(board), residence, Whose::kComponents),
         service_bell_(std::move(service_bell)),
         registry_(std::move(registry)) {
     shm::close_in_children(registry_);
@@ -50,9 +49,6 @@ class SharedMemory : public shm::DecisionMemory {
   [[nodiscard]] const ServiceBell& service_bell() const noexcept { return *service_bell_; }
 
  private:
-  // More need not be kept: others have them too, and a process has 1024 descriptors by default.
-  static constexpr std::size_t kMaxPageDescriptors = 256;
-
   const std::shared_ptr<const ServiceBell> service_bell_;
   shm::FileDescriptor registry_;
 };

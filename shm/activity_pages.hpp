@@ -73,6 +73,10 @@ class ActivityPages {
     return place.number_of(id) == number ? place.activities[id].load(std::memory_order_relaxed)
                                          : nullptr;
   }
+  // Whether that page is here, in force or not.
+  [[nodiscard]] bool has(SourceId id, PageNumber number) const noexcept {
+    return id < kMaxSources && places_[number % 2].number_of(id) == number;
+  }
   // Whether any page of it is here, be it not the one in force.
   [[nodiscard]] bool knows(SourceId id) const noexcept {
     return id < kMaxSources && (places_[0].number_of(id) != 0 || places_[1].number_of(id) != 0);

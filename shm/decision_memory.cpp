@@ -1,15 +1,24 @@
 #include "shm/decision_memory.hpp"
 
+#include <sys/resource.h>
+
 #include <stdexcept>
 #include <utility>
 
 namespace arbiter::shm {
+namespace {
 
-DecisionMemory::DecisionMemory(FileDescriptor board, Residence residence,
-                               std::size_t max_page_descriptors)
-    : residence_(residence),
-      max_page_descriptors_(max_page_descriptors),
-      board_descriptor_(std::move(board)) {
+// A quarter of what this process may have is left for its ports and for all else that it opens.
+bool is_among_those_for_pages(const FileDescriptor& page) noexcept {
+  rlimit limit{};
+  return page && ::getrlimit(RLIMIT_NOFILE, &limit) == 0 &&
+         static_cast<rlim_t>(page.get()) < limit.rlim_cur - limit.rlim_cur / 4;
+}
+
+}  // namespace
+
+DecisionMemory::DecisionMemory(FileDescriptor board, Residence residence, Whose whose)
+    : residence_(residence), whose_(whose), board_descriptor_(std::move(board)) {
   const std::size_t size = checked_size(board_descriptor_, Seals::kFixedSize);
   if (size != sizeof(Board)) throw std::runtime_error("the daemon's board has another size");
   board_ = Mapping(board_descriptor_, size, Access::kReadOnly);
@@ -36,6 +45,11 @@ void DecisionMemory::add_page(SourceId id, PageNumber number, std::string name,
   }
   set_name(id, std::move(name));
   Page& place = mapped_[id][number % 2];
+  const SegmentIdentity identity = identity_of(page);
+  if (place.number == number && place.identity == identity) {  // another daemon shows it again
+    keep(place, std::move(page));
+    return;
+  }
   if (place.number == 0) {
     place.mapping = Mapping(page, sizeof(ActivityPage), Access::kReadOnly);
     leave_behind(place.mapping);
@@ -44,12 +58,8 @@ void DecisionMemory::add_page(SourceId id, PageNumber number, std::string name,
     place.mapping.replace(page);
   }
   place.number = number;
-  const bool is_kept = place.descriptor || descriptors_kept_ < max_page_descriptors_;
-  if (is_kept && !place.descriptor) ++descriptors_kept_;
-  if (is_kept) {
-    place.descriptor = std::move(page);
-    close_in_children(place.descriptor);
-  }
+  place.identity = identity;
+  keep(place, std::move(page));
   const auto attach = [&] {
     pages_->attach(id, number, &place.mapping.as<const ActivityPage>()->of(id));
   };
@@ -62,7 +72,29 @@ void DecisionMemory::add_page(SourceId id, PageNumber number, std::string name,
   attach();
 }
 
-std::vector<DecisionMemory::PageAtHand> DecisionMemory::pages_at_hand() const {
+void DecisionMemory::keep(Page& place, FileDescriptor page) {
+  place.descriptor.reset();
+  if (whose_ == Whose::kWatchers) return;
+  if (!is_among_those_for_pages(page)) {
+    drop_former();
+    page = duplicate(page.get());
+  }
+  if (!is_among_those_for_pages(page)) return;
+  place.descriptor = std::move(page);
+  close_in_children(place.descriptor);
+}
+
+// Those that are in force no longer: no daemon takes them back.
+void DecisionMemory::drop_former() {
+  for (auto& [id, places] : mapped_) {
+    for (Page& page : places) {
+      if (page.number < tables_.pages().of(id)) page.descriptor.reset();
+    }
+  }
+}
+
+std::vector<DecisionMemory::PageAtHand> DecisionMemory::pages_at_hand() {
+  drop_former();
   std::vector<PageAtHand> pages;
   for (const auto& [id, places] : mapped_) {
     for (const Page& page : places) {
@@ -84,8 +116,7 @@ void DecisionMemory::set_name(SourceId id, std::string name) {
   const std::string* const before = known.load(std::memory_order_relaxed);
   if (before != nullptr && *before == name) return;
   std::list<std::string>& texts = texts_[id];
-  const bool is_watcher = max_page_descriptors_ == 0;
-  if (is_watcher && texts.size() == 2) {
+  if (whose_ == Whose::kWatchers && texts.size() == 2) {
     texts.splice(texts.end(), texts, texts.begin());
     texts.back() = std::move(name);
   } else {

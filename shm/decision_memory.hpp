@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <list>
 #include <map>
 #include <memory>
@@ -21,9 +22,12 @@ namespace arbiter::shm {
 // only the thread that adds reads them.
 class DecisionMemory {
  public:
-  // Of at most so many pages the descriptors are kept, for the daemon's successor. None: it is a
-  // watcher's, which hands nothing back. Throws std::system_error, std::runtime_error.
-  DecisionMemory(FileDescriptor board, Residence residence, std::size_t max_page_descriptors);
+  // A component keeps the descriptors of pages for the daemon's successor, as far as its limit
+  // allows; a watcher hands nothing back.
+  enum class Whose : std::uint8_t { kComponents, kWatchers };
+
+  // Throws std::system_error, std::runtime_error.
+  DecisionMemory(FileDescriptor board, Residence residence, Whose whose);
 
   // Of the daemon's memory what the data path reads, as far as it has been written by now: the
   // tables, the next one among them. Throws std::system_error.
@@ -42,7 +46,7 @@ class DecisionMemory {
     PageNumber number = 0;
     int descriptor = -1;
   };
-  [[nodiscard]] std::vector<PageAtHand> pages_at_hand() const;
+  [[nodiscard]] std::vector<PageAtHand> pages_at_hand();
 
   [[nodiscard]] const TableReader& tables() const noexcept { return tables_; }
   [[nodiscard]] const ActivityPages& pages() const noexcept { return *pages_; }
@@ -50,11 +54,15 @@ class DecisionMemory {
   [[nodiscard]] Residence residence() const noexcept { return residence_; }
 
  private:
+  struct Page;
+
   void set_name(SourceId id, std::string name);
+  void keep(Page& place, FileDescriptor page);
+  void drop_former();
   void leave_behind(const Mapping& mapping);
 
   const Residence residence_;
-  const std::size_t max_page_descriptors_;
+  const Whose whose_;
   FileDescriptor board_descriptor_;
   Mapping board_;
   TableReader tables_;
@@ -64,11 +72,11 @@ class DecisionMemory {
   // and no source costs more than two, however often its page changes.
   struct Page {
     PageNumber number = 0;
+    SegmentIdentity identity;
     Mapping mapping;
-    FileDescriptor descriptor;  // none where too many are kept
+    FileDescriptor descriptor;  // none where there was no room to keep it
   };
   std::map<SourceId, std::array<Page, 2>> mapped_;
-  std::size_t descriptors_kept_ = 0;
   std::list<Bequest> bequests_;  // of all of these mappings
 
   // A name is stored before its source's page is attached, and is looked for once the page has been

@@ -61,7 +61,8 @@ Instance::Instance(wire::Caller caller) : caller_(std::move(caller)) {
 void Instance::take_up_memory(wire::Received& welcome) {
   if (memory_ != nullptr && shm::are_one_segment(welcome.descriptors[0], memory_->board())) return;
   memory_ = std::make_shared<shm::DecisionMemory>(std::move(welcome.descriptors[0]),
-                                                  shm::Residence::kMapped, 0);
+                                                  shm::Residence::kMapped,
+                                                  shm::DecisionMemory::Whose::kWatchers);
   shared_ = memory_;
   port_names_.clear();
   port_ids_.clear();

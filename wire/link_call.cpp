@@ -42,6 +42,9 @@ Packet receive_packet(int socket, bool is_sent) {
   }
   if (size <= 0 && !packet.was_asked) throw NotAskedError(kNotAsked);
   if (size <= 0) throw CallError("the link has gone without an answer");
+  if ((header.msg_flags & MSG_CTRUNC) != 0) {
+    throw CallError(no_descriptor_left("what the link sends"));
+  }
   packet.bytes.resize(static_cast<std::size_t>(size));
   const cmsghdr* const part = CMSG_FIRSTHDR(&header);
   if (part != nullptr && part->cmsg_level == SOL_SOCKET && part->cmsg_type == SCM_RIGHTS) {

@@ -50,7 +50,7 @@ std::shared_ptr<OutputCore> open_output(NodeCore& node, std::string_view name, c
 void close_output(std::shared_ptr<OutputCore> core) noexcept {
   if (core == nullptr) return;
   if (!core->process.is_surely_here()) return keep_for_ever(std::move(core));
-  core->node->close(core->instance());
+  core->node->close(*core);
   if (core->loans() != 0) core->kept_by_loans = core;
 }
 LoanedSlot loan(OutputCore& core, std::size_t size) noexcept {
@@ -151,7 +151,7 @@ void close_input(std::shared_ptr<InputCore> core) noexcept {
   if (core->held() != 0) {
     core->kept_by_samples = core;
   } else {
-    core->node->close(core->instance());
+    core->node->close(*core);
   }
 }
 HeldSample take(InputCore& core) {
@@ -209,7 +209,7 @@ void close_tap(std::shared_ptr<TapCore> core) noexcept {
   if (core->held() != 0) {
     core->kept_by_events = core;
   } else {
-    core->node->close(core->instance());
+    core->node->close(*core);
   }
 }
 bool take(TapCore& core, TapEventData& event) {

@@ -60,7 +60,9 @@ class NodeCore : public std::enable_shared_from_this<NodeCore> {
                                         const InputPortOptions& options);
   std::shared_ptr<TapCore> open_tap(std::string_view name, const Type& type,
                                     const TapOptions& options);
-  void close(shm::PortInstance port) noexcept;
+  // Not by its number, for a tap gets another from each daemon.
+  template <class Core>
+  void close(const Core& core) noexcept;
   // What stands behind a port, for the status.
   void describe(shm::PortInstance port, std::string_view text) noexcept;
 
@@ -156,7 +158,7 @@ class NodeCore : public std::enable_shared_from_this<NodeCore> {
   void handle_unmentioned(const wire::Message& message);
   void handle_yield(const wire::Message& message);
   void add_page(wire::Received& received);
-  void note_unseen(const std::string& source, const std::string& why);
+  void miss_page(const std::string& source, const std::string& why);
   void make_tables_resident();
   void hear_of_growth(const wire::Message& message);
   void look_at_growth(shm::PortInstance port, const OutputPeer& peer);
@@ -167,6 +169,7 @@ class NodeCore : public std::enable_shared_from_this<NodeCore> {
   void note(NoticeKind kind, shm::PortInstance port, const std::string& peer,
             const std::string& text);
   void note_refusal(const wire::Message& about, const std::string& why);
+  void refuse_waiting(shm::PortInstance port, const InputPeer& peer, const std::string& why);
   void say_blind(shm::PortInstance port, const char* what_it_does);
   // Empty where it is not open.
   [[nodiscard]] const std::string& name_of_port(shm::PortInstance port) const;

@@ -85,6 +85,16 @@ void NodeCore::refuse_peer(const wire::Message& announced, const std::string& wh
   if (is_to_connect) note_refusal(announced, why);
 }
 
+// Of an input port that waited for a queue.
+void NodeCore::refuse_waiting(shm::PortInstance port, const InputPeer& peer,
+                              const std::string& why) {
+  say_refused(port, peer.instance, why);
+  wire::Message about;
+  about.port = port;
+  about.set_name(peer.name);
+  note_refusal(about, why);
+}
+
 void NodeCore::say_refused(shm::PortInstance port, shm::PortInstance peer, const std::string& why) {
   wire::Message refusal;
   refusal.kind = wire::MessageKind::kPeerRefused;
@@ -113,12 +123,6 @@ void NodeCore::say_blind(shm::PortInstance port, const char* what_it_does) {
   message.port = port;
   message.set_text(text);
   say(message);
-}
-
-// Of no port in particular: whose rules read the source says so when it is missed.
-void NodeCore::note_unseen(const std::string& source, const std::string& why) {
-  const std::lock_guard lock(mutex_);
-  note(NoticeKind::blind, 0, source, "the activity of " + source + " cannot be seen: " + why);
 }
 
 // A refusal that the daemon or the peer has found.

@@ -2,6 +2,7 @@
 #include <exception>
 #include <string>
 #include <system_error>
+#include <type_traits>
 #include <utility>
 
 #include "client/node/names.hpp"
@@ -111,32 +112,28 @@ std::shared_ptr<TapCore> NodeCore::open_tap(std::string_view name, const Type& t
                core->bind(opened.message.port);
                taps_[opened.message.port] = core;
              });
-    const std::lock_guard lock(mutex_);
-    core->is_open = true;
     return core;
   });
 }
 
-void NodeCore::close(shm::PortInstance port) noexcept {
-  std::shared_ptr<OutputCore> output;  // destroyed after the lock is released
-  std::shared_ptr<InputCore> input;
-  std::shared_ptr<TapCore> tap;
-  const std::lock_guard lock(mutex_);
-  if (const auto found = outputs_.find(port); found != outputs_.end()) {
-    output = std::move(found->second);
-    outputs_.erase(found);
-  }
-  if (const auto found = inputs_.find(port); found != inputs_.end()) {
-    input = std::move(found->second);
-    inputs_.erase(found);
-  }
-  if (const auto found = taps_.find(port); found != taps_.end()) {
-    tap = std::move(found->second);
-    taps_.erase(found);
-  }
-  given_.erase(port);
-  descriptions_.erase(port);
-  say_closed(port);
+template <class Core>
+void NodeCore::close(const Core& core) noexcept {
+  const auto close_among = [&](auto& ports) {
+    decltype(ports.extract(ports.begin())) closed;  // destroyed after the lock is released
+    const std::lock_guard lock(mutex_);
+    const shm::PortInstance port = core.instance();
+    closed = ports.extract(port);
+    given_.erase(port);
+    descriptions_.erase(port);
+    say_closed(port);
+  };
+  if constexpr (std::is_same_v<Core, OutputCore>) close_among(outputs_);
+  if constexpr (std::is_same_v<Core, InputCore>) close_among(inputs_);
+  if constexpr (std::is_same_v<Core, TapCore>) close_among(taps_);
 }
+
+template void NodeCore::close(const OutputCore& core) noexcept;
+template void NodeCore::close(const InputCore& core) noexcept;
+template void NodeCore::close(const TapCore& core) noexcept;
 
 }  // namespace arbiter::detail

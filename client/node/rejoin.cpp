@@ -31,7 +31,8 @@ namespace {
 
 // How often a daemon is looked for.
 constexpr std::chrono::milliseconds kRejoinInterval{50};
-// How long until it is tried again with a daemon that does not want us.
+// How long until it is tried again with a daemon that does not want us, or that has shown us what
+// could not be taken up.
 constexpr std::chrono::milliseconds kTurnedAwayInterval{1000};
 
 bool is_sent(const shm::FileDescriptor& socket, const wire::Message& message,
@@ -95,6 +96,14 @@ void NodeCore::be_alone(Clock::duration look_again_in) noexcept {
   standing_ = Standing::kAlone;
   ring_timer_every(look_again_in);
   news_.notify_all();
+}
+
+// The daemon takes the page for shown: it shows it again to a node that comes back. The notice is
+// of no port in particular: whose rules read the source says so when it is missed.
+void NodeCore::miss_page(const std::string& source, const std::string& why) {
+  const std::lock_guard lock(mutex_);
+  note(NoticeKind::blind, 0, source, "the activity of " + source + " cannot be seen: " + why);
+  be_alone(kTurnedAwayInterval);
 }
 
 void NodeCore::rejoin() {

@@ -158,6 +158,7 @@ void NodeCore::tidy_ports(
           instance, peer,
           "the input port misbehaves: it says that it has read samples that were never published");
     }
+    for (const auto& [peer, why] : output->short_of_memory()) refuse_waiting(instance, *peer, why);
     if (output->has_become_blind()) say_blind(instance, "discards its samples");
   }
   for (auto& [instance, input] : inputs_) {
@@ -174,7 +175,7 @@ void NodeCore::tidy_ports(
 }
 
 // This process has no descriptor left for what came with a message. Nothing is lost by that but
-// what the message was about.
+// what the message was about; of a page, not even that.
 void NodeCore::handle_without_descriptors(const wire::Message& message) {
   const std::string why = wire::no_descriptor_left("what the daemon sends");
   switch (message.kind) {
@@ -193,7 +194,7 @@ void NodeCore::handle_without_descriptors(const wire::Message& message) {
       refuse_tap(message, why);
       return;
     case wire::MessageKind::kSourcePage:
-      note_unseen(std::string(message.name_view()), why);
+      miss_page(std::string(message.name_view()), why);
       return;
     default:
       break;
@@ -286,10 +287,10 @@ void NodeCore::add_page(wire::Received& received) {
   try {
     memory_->add_page(message.id, message.value, source, std::move(received.descriptors[0]));
   } catch (const std::exception& error) {
-    if (memory_->pages().find(message.id) != nullptr) {
+    if (memory_->pages().has(message.id, message.value)) {
       say_not_locked(0, error.what());
     } else {
-      note_unseen(source, error.what());
+      miss_page(source, error.what());
     }
   }
   wake_inputs();
@@ -364,6 +365,8 @@ void NodeCore::handle_reply(wire::Received& received) {
   }
   reply.received = std::move(received);
   reply.finished = true;
+  const auto tap = taps_.find(reply.opened);
+  if (tap != taps_.end() && reply.refusal.empty()) tap->second->is_open = true;
   news_.notify_all();
 }
 

@@ -225,11 +225,13 @@ void OutputCore::allocate_slots() {
 }
 
 // For a link that found all channels in use when it came.
-void OutputCore::connect_waiting(InputLink& link) noexcept {
+void OutputCore::connect_waiting(InputLink& link) {
   try {
     assign_channel(link);
     allocate_slots();
-  } catch (const std::exception&) {  // no memory: it stays unconnected
+  } catch (const std::exception& error) {  // no memory: it stays unconnected
+    short_of_memory_.emplace_back(link.peer, error.what());
+    memory_->service_bell().ring();  // for the node to say so
     link.connected = false;
     link.refused = true;
     link.channel = shm::kNone;

@@ -8,6 +8,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <arbiter/detail/cores.hpp>
@@ -74,6 +75,9 @@ class OutputCore {
   void tidy();
   // Those that have begun to misbehave; they are disconnected.
   std::vector<shm::PortInstance> misbehaving();
+  // Those that have waited for a queue and got none for want of memory, each once, with the reason.
+  using Refusal = std::pair<std::shared_ptr<const InputPeer>, std::string>;
+  std::vector<Refusal> short_of_memory() { return std::exchange(short_of_memory_, {}); }
 
   // Port's thread.
 
@@ -173,7 +177,7 @@ class OutputCore {
   void assign_channel(InputLink& link);
   void allocate_slots();
   [[nodiscard]] shm::Destinations number_destinations();
-  void connect_waiting(InputLink& link) noexcept;
+  void connect_waiting(InputLink& link);
   void offer_view();
   void accept_view() noexcept;
   void leave_all_but(const OutputView& view) noexcept;
@@ -244,6 +248,7 @@ class OutputCore {
   // Service thread.
   std::map<shm::PortInstance, InputLink> links_;
   TapSeats taps_;
+  std::vector<Refusal> short_of_memory_;
   std::uint32_t allocated_slots_ = 0;
   const bool yields_;
   shm::Atomic<bool> asked_to_yield_{false};

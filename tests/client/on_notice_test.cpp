@@ -1,10 +1,9 @@
 // NodeOptions::on_notice: what it tells, to whom and how often, and what becomes of what it throws.
-#include <fcntl.h>
 #include <gtest/gtest.h>
 #include <poll.h>
-#include <sys/resource.h>
 
 #include <atomic>
+#include <map>
 #include <mutex>
 #include <optional>
 #include <stdexcept>
@@ -15,12 +14,13 @@
 
 #include <arbiter/arbiter.hpp>
 
-#include "shm/file_descriptor.hpp"
+#include "shm/limits.hpp"
 #include "tests/client/component.hpp"
 #include "tests/client/models.hpp"
 #include "tests/client/samples.hpp"
 #include "tests/support/await.hpp"
 #include "tests/support/daemon.hpp"
+#include "tests/support/descriptor_limit.hpp"
 #include "tests/support/hear_all.hpp"
 
 namespace arbiter::test {
@@ -195,23 +195,6 @@ TEST(OnNotice, WithoutOneStandardErrorSaysIt) {
   EXPECT_EQ(testing::internal::GetCapturedStderr(), line + line) << "the node has both ends";
 }
 
-// While it lives, this process gets no further descriptor.
-class NoDescriptors {
- public:
-  NoDescriptors() {
-    const shm::FileDescriptor next(::fcntl(STDERR_FILENO, F_DUPFD_CLOEXEC, 0));
-    ::getrlimit(RLIMIT_NOFILE, &before_);
-    const rlimit none{static_cast<rlim_t>(next.get()), before_.rlim_max};
-    ::setrlimit(RLIMIT_NOFILE, &none);
-  }
-  NoDescriptors(const NoDescriptors&) = delete;
-  NoDescriptors& operator=(const NoDescriptors&) = delete;
-  ~NoDescriptors() { ::setrlimit(RLIMIT_NOFILE, &before_); }
-
- private:
-  rlimit before_{};
-};
-
 NodeOptions serviced_by_hand(Notices& notices) {
   NodeOptions options = notices.options();
   options.service_thread = false;
@@ -312,6 +295,64 @@ TEST(OnNotice, TellsOfAPortThatCannotSee) {
   EXPECT_EQ(daemon.status()["clients"].is_number(), true);  // the daemon has read on
   EXPECT_NE(daemon.log().find(given[0].text), std::string::npos);
   EXPECT_EQ(take_from(in), 1) << "now it sees";
+}
+
+// The daemon has shown it once, and thinks that it is seen.
+TEST(OnNotice, TellsThatNoDescriptorIsLeftForASourceAndSeesItOnceThereIs) {
+  Daemon daemon(override_model());
+  Notices notices;
+  Node blind("blind", serviced_by_hand(notices));
+  auto in = blind.input_port<Number>("/in");
+  Node sender("sender");
+  auto low = sender.output_port<Number>("/low");
+  blind.service();
+  daemon.load(rules(arbiter_at("/in", select("/low", "not /new"))));
+  hear_all(sender);
+  {
+    const NoDescriptors none;
+    blind.service();
+  }
+  const auto given = notices.take();
+  ASSERT_EQ(given.size(), 1u);
+  EXPECT_EQ(given[0].kind, NoticeKind::blind);
+  EXPECT_EQ(given[0].peer, "/new");
+  EXPECT_NE(given[0].text.find("has no descriptor left"), std::string::npos) << given[0].text;
+  await([&] {
+    blind.service();
+    low.publish(Number{1});
+    return take_from(in) == 1;
+  });
+}
+
+// While one model comes after another a source may have more input ports than queues.
+TEST(OnNotice, TellsThatNoMemoryIsLeftForAPortThatHasWaitedForAQueue) {
+  constexpr int kQueues = 64;
+  Daemon daemon(fan_out_model(kQueues));
+  Notices notices;
+  Node node("test", notices.options());
+  OutputPortOptions options;
+  options.max_loans = 1;
+  options.max_memory = shm::kCacheLine * (2 + 2 * std::size_t{kQueues});  // to hold and to wait
+  auto out = node.output_port<Number>("/out", options);
+  std::vector<InputPort<Number>> inputs;
+  for (int i = 0; i < kQueues; ++i) {
+    inputs.push_back(node.input_port<Number>("/in" + std::to_string(i), {.depth = 1}));
+  }
+  auto last = node.input_port<Number>("/last", {.depth = 1, .max_held = kQueues});
+  static_cast<void>(notices.take());
+  daemon.load(rules(arbiter_at("/last", select("/out"))));
+  std::map<std::string, std::string> refused;  // the reasons, by port
+  await([&] {
+    for (const Notice& each : notices.take()) {
+      if (each.kind == NoticeKind::refused) refused[each.port] = each.text;
+    }
+    return refused.size() == 2;
+  });
+  const std::string reason =
+      "/out is not connected to /last: max_memory of /out leaves no room for another input port";
+  EXPECT_EQ(refused["/out"], reason);
+  EXPECT_EQ(refused["/last"], reason);
+  EXPECT_EQ(out.publish(Number{1}).refused, 1u);
 }
 
 }  // namespace

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <chrono>
+#include <cstddef>
 #include <cstdint>
 #include <map>
 #include <string>
@@ -244,6 +245,39 @@ TEST(Tap, GoesOnUnderAnotherDaemon) {
   sender.tell("publish /out 11");
   EXPECT_EQ(wait_for_kind(tap, TapEventKind::sample).sample()->value, 11);
   EXPECT_EQ(tap.lost(), 0u);
+}
+
+std::size_t taps_of(Daemon& daemon, const std::string& source) {
+  return daemon.source(source).value("taps", nlohmann::json::array()).size();
+}
+
+// By the time that its program has it, the daemon that opened it has gone, and another has come.
+TEST(Tap, OpenedByADaemonThatIsReplacedAtOnceIsKnownToTheNext) {
+  Daemon daemon(single_model());
+  Component sender("sender");
+  ASSERT_EQ(sender.tell("output /out"), "open");
+  Node* self = nullptr;
+  bool is_replaced = false;
+  NodeOptions options;
+  options.service_thread = false;
+  // Within the opening, when it has been answered.
+  options.on_notice = [&](const Notice& notice) {
+    if (notice.port != "/in" || is_replaced) return;
+    is_replaced = true;
+    { auto answered_after_it = self->tap<Number>("/out"); }
+    daemon.kill();
+    daemon.restart();
+    auto answered_by_the_next = self->input_port<Number>("/another");
+  };
+  Node node("test", options);
+  self = &node;
+  auto in = node.input_port<Number>("/in");
+  daemon.load(kNoRules);  // which the node hears, and gives notice of, when it opens the tap
+  auto tap = node.tap<Number>("/out");
+  ASSERT_TRUE(is_replaced);
+  await([&] { return daemon.source("/out")["open"] == true; });
+  auto last = node.input_port<Number>("/last");  // what the node has said before has been heard
+  EXPECT_EQ(taps_of(daemon, "/out"), 1u);
 }
 
 }  // namespace
