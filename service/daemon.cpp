@@ -13,11 +13,11 @@
 #include <stdexcept>
 #include <utility>
 
-#include "service/clients/headroom.hpp"
 #include "service/kept/step.hpp"
 #include "service/log/event.hpp"
 #include "service/log/log.hpp"
 #include "service/log/log_sink.hpp"
+#include "service/policy/headroom.hpp"
 #include "service/policy/users.hpp"
 #include "shm/assertion.hpp"
 #include "shm/clock.hpp"
@@ -34,6 +34,8 @@ constexpr int kMaxMessagesAtOnce = 64;
 constexpr shm::Nanoseconds kMaxTurn = 1'000'000;
 // How often the loop looks who has something to say before it serves those of whom it knows.
 constexpr int kMaxRounds = 64;
+// Of one whose process has ended: another process that has its socket could go on for ever.
+constexpr int kMostLastTurns = 64;
 
 std::uint64_t event_key(std::uint32_t tag, ClientId client) {
   return std::uint64_t{tag} << 56 | client;
@@ -173,7 +175,7 @@ void Daemon::hear_client(ClientId id, std::uint32_t events) {
 }
 
 // It is given up in a turn of its user's, lest the end of a process that had a thousand nodes keep
-// the others waiting. What it sent before it died is served first.
+// the others waiting. What it sent before it died is served first: it may have ended in order.
 void Daemon::hear_death(ClientId id) {
   Client* const found = clients_.find(id);
   if (found == nullptr) return;
@@ -194,7 +196,8 @@ void Daemon::give_turns() {
     Client& client = *found;
     const bool has_more = serve(client);
     if (clients_.find(*id) == nullptr) continue;
-    if (client.is_last_turn || (!has_more && client.is_lost())) {
+    const bool is_over = client.is_last_turn && ++client.last_turns == kMostLastTurns;
+    if (is_over || (!has_more && (client.is_last_turn || client.is_lost()))) {
       drop(*id);
       continue;
     }

@@ -161,6 +161,7 @@ class Daemon final : private Takeover::Host {
   // Whether newcomers and questions are served: not before it is decided which model is in force,
   // or a port that opens meanwhile would be told that no model mentions it.
   [[nodiscard]] bool serves() const { return takeover_.is_over() && changes_.has_settled(); }
+  [[nodiscard]] bool has_links_ahead() const override { return changes_.has_links_ahead(); }
   void begin_to_serve(bool is_fresh) override { changes_.start(is_fresh); }
 
   const std::string instance_;

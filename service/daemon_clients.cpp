@@ -10,11 +10,11 @@
 #include <memory>
 #include <utility>
 
-#include "service/clients/headroom.hpp"
 #include "service/daemon.hpp"
 #include "service/log/event.hpp"
 #include "service/log/log.hpp"
 #include "service/log/log_sink.hpp"
+#include "service/policy/headroom.hpp"
 #include "shm/clock.hpp"
 #include "wire/errands.hpp"
 #include "wire/hang_up.hpp"
@@ -155,7 +155,7 @@ void Daemon::drop(ClientId id) {
   switchboard_.lose_taps(*client, is_away);
   if (is_away) takeover_.set_away(*client);
   while (!client->ports.empty()) remove_port(*client->ports.begin());
-  for (const shm::PortInstance port : client->to_hand_back) switchboard_.forget_away(port);
+  for (const auto& [port, charge] : client->to_hand_back) switchboard_.forget_away(port);
   observers_.forget(id);
   barriers_.forget(id);
   left_unread_.add(client->release_unread());

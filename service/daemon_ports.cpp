@@ -75,7 +75,7 @@ void Daemon::open_output(Client& client, wire::Received& received) {
   Source& source = names_.source(name, client.user());
   names_.let_go(source);  // if it is not opened after all
   require_yielded(client, source, port->yields);
-  takeover_.require_not_kept(source.away, "the output port " + name);
+  takeover_.require_not_kept(client, source.away, "the output port " + name);
   require_not_changing(source);
   if (!source.has_page()) {  // its last publisher has ended, and nobody has handed it back
     names_.replace_lost_page(source);
@@ -126,7 +126,7 @@ void Daemon::open_input(Client& client, wire::Received& received) {
   InputName& input = names_.input(name, client.user());
   names_.let_go(input);
   require_free(client, input.open, "the input port " + name);
-  takeover_.require_not_kept(input.away, "the input port " + name);
+  takeover_.require_not_kept(client, input.away, "the input port " + name);
   takeover_.remember_component(client);
   const InputPort& opened = switchboard_.add(std::move(port), client, input);
   auto reply = reply_to(received.message.request, wire::MessageKind::kOpened);
@@ -209,7 +209,7 @@ void Daemon::deactivate(Client& client, const wire::Message& message) {
                              ", which alone can end its activity: stop it, or let it call "
                              "deactivate()");
   }
-  takeover_.require_not_kept(source->away, "the output port " + name);
+  takeover_.require_not_kept(client, source->away, "the output port " + name);
   require_not_changing(*source);
   if (!source->has_page()) throw std::runtime_error("nobody has the activity of " + name);
   const bool was_active = end_activity(*source);
@@ -223,7 +223,7 @@ void Daemon::deactivate(Client& client, const wire::Message& message) {
               "{} deactivated {}{}", asking.description(), ended.name,
               was_active ? "" : ", which was not active");
   };
-  if (was_active && may_undo(*source)) {
+  if (may_undo(*source)) {  // also where it is inactive for the moment
     change_page(*source, client, message.request, {}, answer);
   } else {
     answer(*source, client);

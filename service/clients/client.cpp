@@ -11,9 +11,9 @@
 #include <cstring>
 #include <system_error>
 
-#include "service/clients/headroom.hpp"
 #include "service/log/event.hpp"
 #include "service/log/log.hpp"
+#include "service/policy/headroom.hpp"
 #include "shm/assertion.hpp"
 #include "shm/foreign.hpp"
 #include "wire/errands.hpp"
@@ -73,7 +73,7 @@ Client::Client(ClientId id, shm::FileDescriptor socket, Shares& shares)
   user_ = peer.uid;
   try {
     if (wire::Errands::of_the_process().is_stuck(user_)) throw LimitExceeded(too_much_waits(user_));
-    descriptors_ = shares_.take(user_, Share::kDescriptors, 2);  // the socket, and the process
+    descriptors_ = shares_.take(user_, Share::kDescriptors, kDescriptors);
   } catch (const LimitExceeded&) {
     wire::hang_up(std::move(socket_), user_);
     throw;
@@ -227,10 +227,12 @@ void Client::read_ahead() {
 bool Client::take_closing_of(shm::PortInstance port) {
   const auto closing = std::find_if(ahead_.begin(), ahead_.end(), [&](const PutAside& each) {
     const wire::Message& message = each.received().message;
-    return message.kind == wire::MessageKind::kClosePort && message.port == port;
+    return (message.kind == wire::MessageKind::kClosePort && message.port == port) ||
+           (message.kind == wire::MessageKind::kNodeEnded && message.link == node);
   });
-  if (closing == ahead_.end()) return ahead_ended_.has_value();
-  ahead_.erase(closing);
+  if (closing == ahead_.end()) return ahead_ended_ && (!comes_back || is_dying());
+  // The end of the node closes others too.
+  if (closing->received().message.kind == wire::MessageKind::kClosePort) ahead_.erase(closing);
   return true;
 }
 

@@ -32,8 +32,13 @@ struct Postponed {
   shm::Nanoseconds deadline = 0;
 };
 
+// Ports that are kept for a component, each with what it counts; nothing since another daemon.
+using KeptPorts = std::map<shm::PortInstance, Charge>;
+
 class Client {
  public:
+  static constexpr std::uint64_t kDescriptors = 2;  // the socket, and the process
+
   // Takes over an accepted socket. Throws std::system_error; LimitExceeded where its user has
   // enough.
   Client(ClientId id, shm::FileDescriptor socket, Shares& shares);
@@ -54,7 +59,8 @@ class Client {
   void read_ahead();
   // Throws LimitExceeded, and then `received` is as it was.
   [[nodiscard]] PutAside put_aside(wire::Received& received) { return {received, user_, shares_}; }
-  // Of what was read ahead: takes out the closing of a port, if it is there.
+  // Of what was read ahead: takes out the closing of a port, if it is there. The end of a
+  // conversation is one too, unless the component may come back for the port.
   [[nodiscard]] bool take_closing_of(shm::PortInstance port);
   // Whether anything was read ahead, be it that the client has hung up.
   [[nodiscard]] bool has_read_ahead() const { return !ahead_.empty() || ahead_ended_; }
@@ -101,17 +107,18 @@ class Client {
   bool is_turned_away = false;  // what it says after that is not heard
   bool is_taken_anew = false;   // it came back from another daemon: what it hands back is not ours
   bool has_service_thread = false;
-  bool is_component = false;  // has opened a port once
-  bool comes_back = false;    // if the conversation is lost: then its ports are kept for it
-  bool is_returning = false;  // and has not handed back all yet:
-  std::set<shm::PortInstance> to_hand_back;        // these are missing
-  bool has_failed_to_return = false;               // one came, and we could not take it
-  std::string why_not_returned;                    // as the log has it; empty: nothing stood there
-  bool has_turn = false;                           // waits for its turn to be served
-  bool is_last_turn = false;                       // for its process has ended
-  Charge charge;                                   // as one of so many clients
-  std::uint32_t postponed = 0;                     // requests that cannot be served yet
-  std::deque<Postponed> to_retry;                  // of these: in its next turns
+  bool is_component = false;          // has opened a port once
+  bool comes_back = false;            // if the conversation is lost: then its ports are kept for it
+  bool is_returning = false;          // and has not handed back all yet:
+  KeptPorts to_hand_back;             // these are missing
+  bool has_failed_to_return = false;  // one came, and we could not take it
+  std::string why_not_returned;       // as the log has it; empty: nothing stood there
+  bool has_turn = false;              // waits for its turn to be served
+  bool is_last_turn = false;          // for its process has ended
+  int last_turns = 0;                 // that it has had since
+  Charge charge;                      // as one of so many clients
+  std::uint32_t postponed = 0;        // requests that cannot be served yet
+  std::deque<Postponed> to_retry;     // of these: in its next turns
   std::uint32_t waits_for_status = 0;              // how often it has asked for a document
   bool watches_queue = false;                      // the loop waits until it can be written
   std::map<shm::SourceId, shm::PageNumber> pages;  // the last that it has been sent, by number

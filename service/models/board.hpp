@@ -28,6 +28,7 @@ class Board {
   void put_in_force();
 
   [[nodiscard]] shm::TableSnapshot in_force() const { return reader_.snapshot(); }
+  [[nodiscard]] TablesInUse in_use() const { return TablesInUse(*mapping_.as<shm::Board>()); }
   // The name of the one in force, be it a predecessor's; empty where there is none.
   [[nodiscard]] std::string name() const;
   // Since when it is; 0 where a predecessor has put it in force.

@@ -81,6 +81,8 @@ class ModelChanges {
   void reload_for_signal(const std::string& by);
   // Begins the next change, if one waits and no other is under way.
   void advance();
+  // For a model that waits for its barrier.
+  [[nodiscard]] bool has_links_ahead() const { return swap_.has_value(); }
   [[nodiscard]] bool can_advance() const { return !swap_ && !preparing_ && !waiting_.empty(); }
   // Readable once the compiler has prepared one: then finish_preparing().
   [[nodiscard]] int descriptor() const { return compiler_.descriptor(); }

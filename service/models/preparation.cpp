@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cstdlib>
+#include <set>
 #include <stdexcept>
 #include <utility>
 
@@ -13,6 +14,7 @@
 #include "service/log/log.hpp"
 #include "service/models/comparison.hpp"
 #include "service/policy/unmatched.hpp"
+#include "shm/limits.hpp"
 
 namespace arbiter::service {
 namespace {
@@ -22,15 +24,28 @@ constexpr std::chrono::seconds kEveryInLog{2};
 // Longer than reading and extracting take, during which nothing is told.
 constexpr int kAtMost = 30;
 
-// Where patterns fit no port of any of the models.
-void note_patterns(const Policy& policy, const std::vector<ModelPointer>& models,
-                   Findings& findings) {
+NamedPorts named_ports(const std::vector<ModelPointer>& models) {
   NamedPorts ports;
   for (const ModelPointer& model : models) {
     const rules::CompiledModel& compiled = model->compiled;
     ports.outputs.insert(ports.outputs.end(), compiled.sources.begin(), compiled.sources.end());
     for (const rules::CompiledPort& port : compiled.ports) ports.inputs.push_back(port.port);
   }
+  return ports;
+}
+
+// Those of all models have a place in the memory of the instance, be they in force or not.
+void check_count(const std::vector<std::string_view>& names, std::size_t limit,
+                 const std::string& what, Findings& findings) {
+  const std::size_t count = std::set(names.begin(), names.end()).size();
+  if (count <= limit) return;
+  findings.add_failure("limit-exceeded: the models together name " + std::to_string(count) + " " +
+                       what + ", and an instance has at most " + std::to_string(limit) +
+                       "; give it fewer models, or let them name fewer");
+}
+
+// Where patterns fit no port of any of the models.
+void note_patterns(const Policy& policy, NamedPorts ports, Findings& findings) {
   rules::Diagnostics unmatched;
   find_unmatched(policy, std::move(ports), unmatched);
   findings.add(kOfPolicy, std::move(unmatched));
@@ -45,9 +60,11 @@ Reading read_files(const std::vector<NamedFiles>& files, const Gate& gate, const
   reading.policy = gate.read(reading.findings);
   if (reading.findings.has_errors()) reading.policy.reset();  // what it warns of, --strict refuses
   reading.models = read_models(files, proving, stop, reading.findings);
-  if (reading.policy && !reading.findings.has_errors()) {
-    note_patterns(*reading.policy, reading.models, reading.findings);
-  }
+  if (reading.findings.has_errors()) return reading;
+  NamedPorts ports = named_ports(reading.models);
+  check_count(ports.outputs, shm::kMaxSources, "sources", reading.findings);
+  check_count(ports.inputs, shm::kMaxInputPorts, "input ports", reading.findings);
+  if (reading.policy) note_patterns(*reading.policy, std::move(ports), reading.findings);
   return reading;
 }
 

@@ -1,10 +1,9 @@
 #include "service/policy/shares.hpp"
 
-#include <sys/resource.h>
-
 #include <algorithm>
 #include <limits>
 
+#include "service/policy/headroom.hpp"
 #include "service/policy/users.hpp"
 #include "shm/assertion.hpp"
 #include "shm/limits.hpp"
@@ -34,7 +33,7 @@ Naming naming(Share what) {
       return {"names of input ports that no model names", "kMaxInputPorts",
               "close some, or name them in the model"};
     case Share::kDescriptors:
-      return {"descriptors", "the daemon's RLIMIT_NOFILE, less 64",
+      return {"descriptors", "the daemon's RLIMIT_NOFILE, less what it needs itself",
               "close ports or nodes, or raise LimitNOFILE= of the service"};
     case Share::kQueue:
       return {"bytes of waiting messages", "64 MiB", "let its nodes read what they are sent"};
@@ -50,10 +49,8 @@ std::size_t index(Share what) { return static_cast<std::size_t>(what); }
 }  // namespace
 
 Totals totals_of_this_process() {
-  rlimit limit{};
-  if (getrlimit(RLIMIT_NOFILE, &limit) != 0) limit.rlim_cur = 1024;
-  const std::uint64_t descriptors =
-      std::min<std::uint64_t>(limit.rlim_cur, std::numeric_limits<std::int32_t>::max());
+  const std::uint64_t descriptors = std::min<std::uint64_t>(
+      Headroom::of_the_process().limit(), std::numeric_limits<std::int32_t>::max());
   Totals totals{};
   totals[index(Share::kClients)] = shm::kMaxClients;
   totals[index(Share::kSources)] = shm::kMaxSources;
@@ -93,6 +90,14 @@ Charge Shares::take(uid_t user, Share what, std::uint64_t amount) {
 Charge Shares::take_own(Share what, std::uint64_t amount) {
   add(own_, what, amount);
   return {*this, what, amount, 0, true};
+}
+
+void Shares::pass_to(uid_t user, Charge& charge, std::uint64_t left) {
+  if (!charge.is_own()) return;
+  const Share what = charge.what_;
+  const std::uint64_t amount = charge.amount_;
+  charge = {};
+  charge = allows(user, what, amount + left) ? take(user, what, amount) : take_own(what, amount);
 }
 
 void Shares::give_back(const Charge& charge) noexcept {

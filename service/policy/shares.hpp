@@ -96,6 +96,9 @@ class Shares {
   Charge take(uid_t user, Share what, std::uint64_t amount = 1);
   // For the daemon itself.
   Charge take_own(Share what, std::uint64_t amount = 1);
+  // What the daemon has taken for itself is the user's from now on, as far as it is within the
+  // user's share, and `left` more are.
+  void pass_to(uid_t user, Charge& charge, std::uint64_t left = 0);
 
   [[nodiscard]] bool allows(uid_t user, Share what, std::uint64_t amount) const;
   [[nodiscard]] std::uint64_t taken(uid_t user, Share what) const;
@@ -119,7 +122,8 @@ class Shares {
   std::map<uid_t, Account> accounts_;  // of users who have something
 };
 
-// As the process has it by now: its limit of descriptors.
+// By the process's limit of descriptors, less what messages may bring
+// (service/policy/headroom.hpp).
 Totals totals_of_this_process();
 
 }  // namespace arbiter::service

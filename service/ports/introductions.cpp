@@ -1,16 +1,15 @@
 #include "service/ports/introductions.hpp"
 
-#include <utility>
-
 #include "service/kept/step.hpp"
 #include "shm/clock.hpp"
 
 namespace arbiter::service {
 
-void Introductions::introduce(const Switchboard::Told& told, std::function<void()> passed) {
+void Introductions::introduce(const Switchboard::Told& told, const std::function<void()>& passed) {
   const shm::Nanoseconds deadline = shm::monotonic_now() + kMaxWaitForClients;
-  barriers_.raise(told, deadline, [this, deadline, passed = std::move(passed)] {
-    const auto receivers = switchboard_.show_segments();
+  // Another introduction may pass its barrier first: these links are none of its.
+  barriers_.raise(told, deadline, [=, this, fresh = switchboard_.take_fresh()] {
+    const auto receivers = switchboard_.show_segments(fresh);
     at_step("segments-shown");
     show_growth_soon();
     barriers_.raise(receivers, deadline, passed);

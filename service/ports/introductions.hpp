@@ -23,7 +23,7 @@ class Introductions {
       : switchboard_(switchboard), barriers_(barriers) {}
 
   // Calls `passed` once clients have taken up what they were told, or have had the time for it.
-  void introduce(const Switchboard::Told& told, std::function<void()> passed);
+  void introduce(const Switchboard::Told& told, const std::function<void()>& passed);
   // That publishers use more memory is told within kShowGrowthAfter.
   void show_growth_soon();
   // Tells receivers what is not urgent, when it is time for that.

@@ -67,8 +67,8 @@ void PortNames::discard_page(const Source& source, shm::PageNumber number) const
   if (stores_) discard_stored(stored_name(source.id, number));
 }
 
-void PortNames::restore(std::uint64_t generation) {
-  generation_ = generation;
+void PortNames::restore(const TablesInUse& tables) {
+  generation_ = tables.newest();
   for (shm::SourceId id = 0; id < registry_.source_count(); ++id) {
     auto source = std::make_unique<Source>();
     source->id = id;
@@ -78,7 +78,7 @@ void PortNames::restore(std::uint64_t generation) {
     if (source_ids_.contains(source->name)) source->name.clear();  // no daemon of ours writes that
     if (!source->name.empty()) {
       source->page_user = entry.page_user(source->page_number);
-      source->used_by_generation = generation;
+      source->used_by_generation = tables.last_naming(id, &shm::TableView::knows_source);
       source->away = entry.owner().port;
       source->charge = shares_.take_own(Share::kSources);
       source->page_charge = shares_.take_own(Share::kDescriptors, kDescriptorsOfPage);
@@ -95,7 +95,7 @@ void PortNames::restore(std::uint64_t generation) {
     input->name = entry.name();
     if (input_ids_.contains(input->name)) input->name.clear();
     if (!input->name.empty()) {
-      input->used_by_generation = generation;
+      input->used_by_generation = tables.last_naming(id, &shm::TableView::knows_port);
       input->away = entry.owner().port;
       input->charge = shares_.take_own(Share::kInputs);
       input_ids_[input->name] = id;
@@ -105,6 +105,7 @@ void PortNames::restore(std::uint64_t generation) {
     }
     inputs_.push_back(std::move(input));
   }
+  let_go_all();
 }
 
 bool PortNames::take_page(shm::SourceId id, const shm::FileDescriptor& page) {
@@ -129,11 +130,13 @@ bool PortNames::has_lost_page(const Source& source) {
   return !source.has_page() && source.away == 0 && !source.name.empty();
 }
 
-bool PortNames::replace_lost_pages(const shm::TableView& table) {
+bool PortNames::replace_lost_pages(const shm::TableView& table, std::vector<std::string>& lost) {
   bool any = false;
   for (const auto& source : sources_) {
     if (!has_lost_page(*source) || !table.knows_source(source->id)) continue;
+    const bool was_open = source->page_user.has_value();
     replace_lost_page(*source);
+    if (was_open && table.timeout(source->id) == shm::kForever) lost.push_back(source->name);
     any = true;
   }
   return any;

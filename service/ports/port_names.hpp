@@ -19,6 +19,7 @@
 
 #include "service/kept/registry.hpp"
 #include "service/policy/shares.hpp"
+#include "service/ports/tables_in_use.hpp"
 #include "shm/activity.hpp"
 #include "shm/decision.hpp"
 #include "shm/ids.hpp"
@@ -83,7 +84,7 @@ class PortNames {
   // Where it says which pages are in force.
   void use_board(const shm::TableWriter& board) { board_ = board; }
   // Takes up what a predecessor has registered; pages come by take_page().
-  void restore(std::uint64_t generation);
+  void restore(const TablesInUse& tables);
   // One page that somebody hands back. False: it is not the page in force of that source.
   // Throws std::runtime_error where it is none that a daemon of ours has made.
   bool take_page(shm::SourceId id, const shm::FileDescriptor& page);
@@ -94,8 +95,9 @@ class PortNames {
   // std::system_error.
   void replace_lost_page(Source& source);
   // Does so for the sources that the table in force names by their ids, so that they go on being
-  // the same. True: for one at least. Throws std::system_error.
-  bool replace_lost_pages(const shm::TableView& table);
+  // the same. True: for one at least. `lost`: to those is added who may have been active for ever.
+  // Throws std::system_error.
+  bool replace_lost_pages(const shm::TableView& table, std::vector<std::string>& lost);
   // Gives up the names of the others: used again, they get another id.
   void forget_lost_pages(const shm::TableView& table);
 

@@ -254,9 +254,9 @@ void Switchboard::make_link(const OutputPort& output, const InputPort& input, Li
   fresh_.emplace_back(output.instance, input.instance);
 }
 
-Switchboard::Told Switchboard::show_segments() {
+Switchboard::Told Switchboard::show_segments(const std::vector<LinkKey>& fresh) {
   Told told;
-  for (const LinkKey& key : std::exchange(fresh_, {})) {
+  for (const LinkKey& key : fresh) {
     if (!is_connected(key)) continue;
     Client& receiver = client_of(key.second);
     receiver.send(message_to(wire::MessageKind::kOutputGrown, key.second, key.first));

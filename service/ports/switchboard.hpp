@@ -53,8 +53,8 @@ class Switchboard {
   void tell_tap(const wire::Received& answer);
 
   // The component lives, but its conversation is lost: its links stand, and become claims of its
-  // peers; its name is kept for it.
-  void set_away(shm::PortInstance port);
+  // peers; its name is kept for it. What it counts, which goes on.
+  [[nodiscard]] Charge set_away(shm::PortInstance port);
   // It comes back, with the instance that it had.
   OutputPort& readmit(std::unique_ptr<OutputPort> port, Client& client, Source& source);
   InputPort& readmit(std::unique_ptr<InputPort> port, Client& client, InputName& name);
@@ -73,7 +73,9 @@ class Switchboard {
   // An output port takes up a receiver by using more of its segment. Once it has, receivers must be
   // told, to map it before they need it: the one that is new, at once; the others by and by, once
   // for all that have come meanwhile (show_growth(), for as long as there is some to show).
-  Told show_segments();
+  // The links that were made since this was asked last: their publishers are taking them up.
+  [[nodiscard]] std::vector<LinkKey> take_fresh() { return std::exchange(fresh_, {}); }
+  Told show_segments(const std::vector<LinkKey>& fresh);
   void show_growth();
   [[nodiscard]] bool has_growth_to_show() const { return !growth_.empty(); }
   // Shows the source's next page to all components that have been sent the one in force.
@@ -82,7 +84,7 @@ class Switchboard {
   // nothing more once it does not read. True: there is more that it would read.
   bool show_news(Client& client, std::uint64_t& told, int& left);
   // A client could not take up a peer.
-  void refuse(shm::PortInstance port, shm::PortInstance peer, const std::string& why);
+  void refuse(shm::PortInstance port, shm::PortInstance peer, std::string why);
   // Tells the components, and the log, once, whose ports the model in force does not mention: of
   // all ports, or of one. `table` of generation 0: there is no model.
   void tell_unmentioned(const shm::TableSnapshot& in_force);

@@ -26,7 +26,7 @@ std::optional<std::uint64_t> take(Claims& claims, shm::PortInstance peer) {
 
 }  // namespace
 
-void Switchboard::set_away(shm::PortInstance port) {
+Charge Switchboard::set_away(shm::PortInstance port) {
   for (auto link = links_.begin(); link != links_.end();) {
     const auto [output, input] = link->first;
     if (output == port && (link->second.is_mutual() || link->second.is_refused())) {
@@ -38,9 +38,13 @@ void Switchboard::set_away(shm::PortInstance port) {
   taps_.set_away(port);
   Source* source = names_.source_of(port);
   InputName* name = names_.input_of(port);
+  const auto output = outputs_.find(port);
+  Charge charge =
+      std::move(output == outputs_.end() ? inputs_.at(port)->charge : output->second->charge);
   erase(port);
   if (source != nullptr) source->away = port;
   if (name != nullptr) name->away = port;
+  return charge;
 }
 
 OutputPort& Switchboard::readmit(std::unique_ptr<OutputPort> port, Client& client, Source& source) {

@@ -43,7 +43,8 @@ void Switchboard::tell_refusal(const LinkKey& key, shm::PortInstance to,
 }
 
 // The one that refuses knows it.
-void Switchboard::refuse(shm::PortInstance port, shm::PortInstance peer, const std::string& why) {
+void Switchboard::refuse(shm::PortInstance port, shm::PortInstance peer, std::string why) {
+  if (why.empty()) why = "its component gives no reason";
   if (const auto output = outputs_.find(port); output != outputs_.end()) {
     taps_.refuse(*output->second, peer, why);
   }

@@ -107,8 +107,8 @@ void Takeover::take_back_page(Client& client, const wire::Received& received) {
 void Takeover::take_back_output(Client& client, const wire::Received& received) {
   const wire::Message& message = received.message;
   Source* source = names_.source_by_id(message.id);
-  if (source == nullptr || source->away != message.port ||
-      client.to_hand_back.count(message.port) == 0) {
+  const auto kept = client.to_hand_back.find(message.port);
+  if (source == nullptr || source->away != message.port || kept == client.to_hand_back.end()) {
     throw std::runtime_error("an output port that it never had was handed back");
   }
   // Without the page that is in force nobody would know of its activity.
@@ -116,7 +116,9 @@ void Takeover::take_back_output(Client& client, const wire::Received& received) 
     throw std::runtime_error("an output port was handed back with a page that is not its own");
   }
   auto port = adopt_output(received, client.user());
-  client.to_hand_back.erase(message.port);
+  charge(client.user(), *source);
+  port->charge = charge_of_port(client.user(), std::move(kept->second), kDescriptorsOfOutput);
+  client.to_hand_back.erase(kept);
   switchboard_.readmit(std::move(port), client, *source);
   at_step("output-readmitted");
 }
@@ -124,12 +126,14 @@ void Takeover::take_back_output(Client& client, const wire::Received& received) 
 void Takeover::take_back_input(Client& client, const wire::Received& received) {
   const wire::Message& message = received.message;
   InputName* input = names_.input_by_id(message.id);
-  if (input == nullptr || input->away != message.port ||
-      client.to_hand_back.count(message.port) == 0) {
+  const auto kept = client.to_hand_back.find(message.port);
+  if (input == nullptr || input->away != message.port || kept == client.to_hand_back.end()) {
     throw std::runtime_error("an input port that it never had was handed back");
   }
   auto port = adopt_input(received, client.user());
-  client.to_hand_back.erase(message.port);
+  charge(client.user(), *input);
+  port->charge = charge_of_port(client.user(), std::move(kept->second), kDescriptorsOfInput);
+  client.to_hand_back.erase(kept);
   switchboard_.readmit(std::move(port), client, *input);
   at_step("input-readmitted");
 }
@@ -161,7 +165,7 @@ void Takeover::finish_return(Client& client) {
   }
   client.is_returning = false;
   client.why_not_returned.clear();
-  for (const shm::PortInstance port : std::exchange(client.to_hand_back, {})) {
+  for (const auto& [port, charge] : std::exchange(client.to_hand_back, {})) {
     switchboard_.forget_away(port);  // closed meanwhile
   }
   std::set<shm::PortInstance> away;
@@ -173,7 +177,7 @@ void Takeover::finish_return(Client& client) {
   at_step("claims-settled");
   const auto table = board_.in_force().table;
   switchboard_.link_all(table);
-  switchboard_.unlink(table);
+  if (!host_.has_links_ahead()) switchboard_.unlink(table);
   host_.try_postponed();
   log_event({EventKind::kBack, {client.name}}, log::level::info, "{} is back, with {} port{}",
             client.description(), client.ports.size(), client.ports.size() == 1 ? "" : "s");
@@ -186,8 +190,10 @@ void Takeover::set_away(Client& client) {
   absentee.pid = client.pid();
   absentee.user = client.user();
   absentee.ports = std::exchange(client.to_hand_back, {});
-  absentee.ports.insert(client.ports.begin(), client.ports.end());
-  while (!client.ports.empty()) switchboard_.set_away(*client.ports.begin());
+  while (!client.ports.empty()) {
+    const shm::PortInstance port = *client.ports.begin();
+    absentee.ports[port] = switchboard_.set_away(port);
+  }
   absentee.process = client.release_process();
   absentee.why_not_returned = std::move(client.why_not_returned);
   absentee.charge = std::move(client.charge);
@@ -223,7 +229,7 @@ void Takeover::forget_absentee(NodeId node) {
 void Takeover::give_up(NodeId node) {
   const Absentee absentee = std::move(absentees_.at(node));
   absentees_.erase(node);
-  for (const shm::PortInstance port : absentee.ports) switchboard_.forget_away(port);
+  for (const auto& [port, charge] : absentee.ports) switchboard_.forget_away(port);
   if (is_over()) replace_lost_pages();
   host_.try_postponed();
 }
@@ -251,16 +257,22 @@ Charge Takeover::make_room_for(const Client& newcomer, NodeId former) {
   return shares_.take(newcomer.user(), Share::kClients);
 }
 
-void Takeover::require_not_kept(shm::PortInstance holder, const std::string& what) {
+// Its ports may be another node's of the same program, which go on without us.
+void Takeover::require_not_kept(const Client& asking, shm::PortInstance holder,
+                                const std::string& what) {
   for (const auto& [node, absentee] : absentees_) {
     if (absentee.ports.count(holder) == 0) continue;
     if (has_ended(absentee.process)) {
       forget_absentee(node);
       return;
     }
-    throw NotYet(what + " is kept for process " + std::to_string(absentee.pid) +
-                     ", which lives but does not answer",
-                 shm::monotonic_now() + kMaxWaitForDeath);
+    throw NotYet(
+        what + " is kept for process " + std::to_string(absentee.pid) +
+            (is_that(asking, absentee)
+                 ? ", yours, which had it open and has not closed it: if you have executed "
+                   "another program (exec), end the process and start anew"
+                 : ", which lives but does not answer"),
+        shm::monotonic_now() + kMaxWaitForDeath);
   }
   for (const auto& [id, client] : clients_) {
     if (client->to_hand_back.count(holder) != 0) {

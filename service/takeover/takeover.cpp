@@ -6,14 +6,15 @@
 
 #include <algorithm>
 #include <exception>
+#include <string>
 #include <system_error>
 #include <utility>
+#include <vector>
 
-#include "service/clients/headroom.hpp"
-#include "service/kept/descriptor_store.hpp"
 #include "service/kept/step.hpp"
 #include "service/log/event.hpp"
 #include "service/log/log.hpp"
+#include "service/policy/headroom.hpp"
 #include "shm/clock.hpp"
 
 namespace arbiter::service {
@@ -29,6 +30,20 @@ constexpr std::size_t kMaxForgotten = 64;
 // For want of room or of descriptors: when it is tried again to write the state file, or to watch
 // an absentee.
 constexpr shm::Nanoseconds kTryAgainAfter = 1'000'000'000;
+
+void warn_of_lost_activity(const std::vector<std::string>& sources) {
+  constexpr std::size_t kMostNamed = 16;
+  if (sources.empty()) return;
+  std::string names;
+  for (std::size_t i = 0; i < std::min(sources.size(), kMostNamed); ++i) {
+    names += (i == 0 ? "" : ", ") + sources[i];
+  }
+  if (sources.size() > kMostNamed) {
+    names += " and " + std::to_string(sources.size() - kMostNamed) + " more";
+  }
+  log::warn("nobody has handed back the activity of {}: where it was to last for ever, it is over",
+            names);
+}
 
 shm::FileDescriptor open_process(pid_t pid) {
   return shm::FileDescriptor(static_cast<int>(syscall(SYS_pidfd_open, pid, 0)));
@@ -75,6 +90,7 @@ void Takeover::look_for_predecessor() {
 // What the service manager has kept. False: nothing that is of use.
 bool Takeover::inherit_stored() {
   const auto stored = take_stored();
+  for (const StoredDescriptor& each : stored) stored_.push_back(each.name);
   const auto find = [&](const char* name) {
     return std::find_if(stored.begin(), stored.end(),
                         [&](const StoredDescriptor& each) { return each.name == name; });
@@ -84,14 +100,21 @@ bool Takeover::inherit_stored() {
   if (board == stored.end() || registry == stored.end()) return false;
   try {
     inherit(board->descriptor, registry->descriptor);
-    for (const StoredDescriptor& each : stored) {
-      if (&each == &*board || &each == &*registry) continue;
-      if (!names_.take_stored_page(each.name, each.descriptor)) discard_stored(each.name);
-    }
-    return true;
   } catch (const std::exception& error) {
     log::warn("the memory kept by the service manager cannot be used: {}", error.what());
     return false;
+  }
+  for (const StoredDescriptor& each : stored) {
+    if (&each != &*board && &each != &*registry) take_stored_page(each);
+  }
+  return true;
+}
+
+void Takeover::take_stored_page(const StoredDescriptor& stored) {
+  try {
+    if (!names_.take_stored_page(stored.name, stored.descriptor)) discard_stored(stored.name);
+  } catch (const std::exception& error) {
+    log::warn("{}, kept by the service manager, cannot be used: {}", stored.name, error.what());
   }
 }
 
@@ -100,7 +123,7 @@ void Takeover::inherit(const shm::FileDescriptor& board, const shm::FileDescript
   board_.inherit(board);
   registry_ = std::move(inherited);
   at_step("registry-taken-up");
-  names_.restore(board_.in_force().generation);
+  names_.restore(board_.in_use());
   at_step("names-restored");
   find_absentees();
   phase_ = Phase::kTakingOver;
@@ -117,6 +140,36 @@ void Takeover::find_absentees() {
   for (const auto& input : names_.inputs()) {
     if (input->away != 0) add_absentee(registry_.input(input->id).owner());
   }
+  for (const auto& source : names_.sources()) {
+    if (source->away != 0) charge_away(*source, registry_.source(source->id).owner());
+  }
+  for (const auto& input : names_.inputs()) {
+    if (input->away != 0) charge_away(*input, registry_.input(input->id).owner());
+  }
+}
+
+template <class Name>
+void Takeover::charge_away(Name& name, const Owner& owner) {
+  const Absentee& absentee = absentees_.at(owner.node);
+  if (absentee.user) charge(*absentee.user, name);
+}
+
+void Takeover::charge(uid_t user, Source& source) {
+  if (board_.in_force().table.knows_source(source.id)) return;
+  shares_.pass_to(user, source.charge);
+  shares_.pass_to(user, source.page_charge, left_for_absentees());
+}
+
+void Takeover::charge(uid_t user, InputName& input) {
+  if (!board_.in_force().table.knows_port(input.id)) shares_.pass_to(user, input.charge);
+}
+
+Charge Takeover::charge_of_port(uid_t user, Charge kept, std::uint64_t descriptors) {
+  if (!kept) {
+    kept = shares_.take_own(Share::kDescriptors, descriptors);
+    shares_.pass_to(user, kept, left_for_absentees());
+  }
+  return kept;
 }
 
 void Takeover::add_absentee(const Owner& owner) {
@@ -136,7 +189,7 @@ void Takeover::add_absentee(const Owner& owner) {
                           ? shares_.take(*absentee.user, Share::kClients)
                           : shares_.take_own(Share::kClients);
   }
-  absentee.ports.insert(owner.port);
+  absentee.ports.try_emplace(owner.port);
 }
 
 // For want of a descriptor it is tried again: what lives is not taken for what has ended.
@@ -179,6 +232,8 @@ void Takeover::finish() {
       discard_stored("board");
       at_step("store-half-emptied");
       discard_stored("registry");
+      // Or the next daemon would give up new pages with old ones of the same names.
+      for (const std::string& page : std::exchange(stored_, {})) discard_stored(page);
       at_step("store-emptied");
       store("board", board_.writable());
       at_step("board-stored");
@@ -197,12 +252,14 @@ void Takeover::finish() {
 // The table in force goes on, perhaps for good: what it names by an id must stay what it was.
 void Takeover::replace_lost_pages() {
   const auto table = board_.in_force().table;
+  std::vector<std::string> lost;
   try {
-    if (names_.replace_lost_pages(table)) switchboard_.link_all(table);
+    if (names_.replace_lost_pages(table, lost)) switchboard_.link_all(table);
   } catch (const std::system_error& error) {
     log::warn("not each source that was lost with the last daemon has an activity page again: {}",
               error.what());
   }
+  warn_of_lost_activity(lost);
 }
 
 shm::Nanoseconds Takeover::deadline() const {

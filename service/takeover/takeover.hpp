@@ -23,6 +23,7 @@
 
 #include "service/clients/clients.hpp"
 #include "service/clients/gate.hpp"
+#include "service/kept/descriptor_store.hpp"
 #include "service/kept/registry.hpp"
 #include "service/kept/state_file.hpp"
 #include "service/models/board.hpp"
@@ -51,6 +52,8 @@ class Takeover {
     virtual void close_all(Client& client) = 0;
     // A client is known from now on, and is to hear so.
     virtual void welcome(Client& client) = 0;
+    // Whether links have been made for a model that is not in force yet.
+    [[nodiscard]] virtual bool has_links_ahead() const = 0;
     // Requests that could not be served may be served now.
     virtual void try_postponed() = 0;
     // All who came in time are back. `is_fresh`: there was nobody to come back.
@@ -117,7 +120,7 @@ class Takeover {
   // LimitExceeded where there is no room for another. `former`: who it says that it was; 0: nobody.
   [[nodiscard]] Charge make_room_for(const Client& newcomer, NodeId former);
   // That a name is kept for nobody who is away. Throws NotYet.
-  void require_not_kept(shm::PortInstance holder, const std::string& what);
+  void require_not_kept(const Client& asking, shm::PortInstance holder, const std::string& what);
 
   // For a successor: that client has opened a port.
   void remember_component(Client& client);
@@ -132,15 +135,27 @@ class Takeover {
     std::uint64_t started = 0;    // Process::started; 0 where its pidfd came with the component
     std::optional<uid_t> user;    // empty: it cannot be told
     shm::FileDescriptor process;  // none: it is to be opened yet
-    std::set<shm::PortInstance> ports;
+    KeptPorts ports;
     std::string why_not_returned;  // Client::why_not_returned
     Charge charge;
   };
 
   [[nodiscard]] bool inherit_stored();
+  void take_stored_page(const StoredDescriptor& stored);
   void inherit(const shm::FileDescriptor& board, const shm::FileDescriptor& registry);
   void find_absentees();
   void add_absentee(const Owner& owner);
+  // Names that are taken up are the daemon's own at first. Then they count as their user's, and so
+  // do ports that come back, but for what the components that are away need to come back by.
+  void charge(uid_t user, Source& source);
+  void charge(uid_t user, InputName& input);
+  // `kept`: what it has counted all the time; empty where that was under another daemon.
+  [[nodiscard]] Charge charge_of_port(uid_t user, Charge kept, std::uint64_t descriptors);
+  [[nodiscard]] std::uint64_t left_for_absentees() const {
+    return Client::kDescriptors * absentees_.size();
+  }
+  template <class Name>
+  void charge_away(Name& name, const Owner& owner);
   // False: it has ended.
   [[nodiscard]] bool open_and_watch(NodeId node, Absentee& absentee);
   void watch_unwatched();
@@ -169,6 +184,7 @@ class Takeover {
   const bool stores_;
   Phase phase_ = Phase::kServing;
   std::optional<Predecessor> predecessor_;
+  std::vector<std::string> stored_;  // what the service manager has kept, by name
   shm::Nanoseconds started_ = 0;
   std::map<NodeId, Absentee> absentees_;
   Strangers strangers_;

@@ -179,6 +179,20 @@ TEST_F(AFormerOwner, CannotBringBackWhatAnOperatorHasEnded) {
   EXPECT_FALSE(daemon_->source("/estop:o")["active"]);
 }
 
+// Whoever flips his activity is inactive now and then.
+TEST_F(AFormerOwner, CannotBringBackWhatAnOperatorFoundInactive) {
+  take_it_away();
+  Robot robot;
+  auto& [node, drive, motor] = robot;
+  RawClient arbiter(daemon_->instance());
+  arbiter.hello("operator");
+  arbiter.send(RawClient::message(MessageKind::kDeactivate, "/estop:o"));
+  EXPECT_EQ(arbiter.expect(MessageKind::kDone).message.value, 0u);
+  stranger_->tell('s');
+  EXPECT_EQ(drive.publish(1).delivered, 1u);
+  EXPECT_FALSE(daemon_->source("/estop:o")["active"]);
+}
+
 TEST_F(AFormerOwner, CannotHandBackHisPageToTheNextDaemon) {
   take_it_away();
   Robot robot;

@@ -67,6 +67,11 @@ class Component {
   [[nodiscard]] ChildProcess& process() { return process_; }
   // At whatever instruction it is.
   void kill() { process_.kill(); }
+  // In order: it closes its ports, and its node. Returns as ChildProcess::wait().
+  int end() {
+    say_.reset();
+    return process_.wait();
+  }
 
  private:
   shm::FileDescriptor say_;

@@ -186,6 +186,18 @@ TEST(Takeover, TheNameOfOneThatDiesWithItsPageIsFree) {
   auto out = node.output_port<Number>("/out");
   EXPECT_EQ(out.publish(Number{1}).delivered, 1u);
   EXPECT_EQ(take_from(in), 1);
+  EXPECT_NE(daemon.log().find("nobody has handed back the activity of /out:"), std::string::npos);
+}
+
+// Nor does anybody miss what nobody has ever had open.
+TEST(Takeover, SaysNothingOfActivityThatCannotBe) {
+  Daemon daemon(single_model());
+  Node node("test");
+  auto other = node.output_port<Number>("/other");
+  daemon.kill();
+  daemon.restart();
+  auto out = node.output_port<Number>("/out");
+  EXPECT_EQ(daemon.log().find("the activity of"), std::string::npos) << daemon.log();
 }
 
 }  // namespace

@@ -66,6 +66,20 @@ TEST(Takeover, AComponentWithoutPortsIsANewcomerToOtherMemory) {
   EXPECT_TRUE(daemon.status()["strangers"].empty());
 }
 
+// Its process has ended before the daemon reads what it has said, which is more than one turn's.
+TEST(Deaths, AreNotThoseOfComponentsThatCloseAllBeforeTheyEnd) {
+  Daemon daemon(single_model());
+  Component component("component");
+  for (int i = 0; i < 100; ++i) {
+    ASSERT_EQ(component.tell("output /out" + std::to_string(i)), "open");
+  }
+  daemon.process().stop();
+  EXPECT_EQ(component.end(), 0);
+  daemon.process().signal(SIGCONT);
+  await([&] { return daemon.status()["clients"] == 1; });
+  EXPECT_TRUE(daemon.status()["deaths"].empty()) << daemon.log();
+}
+
 // Its process lives, so the next daemon would keep its ports for it.
 TEST(Takeover, OfANodeThatHasEndedTheNextOneOfItsProcessFreesThePorts) {
   Daemon daemon(single_model());

@@ -333,6 +333,30 @@ TEST_F(HostileClient, ThatRefusesItsPeerIsNotDeliveredTo) {
   in_ = node_.input_port<int>("/in");
 }
 
+// Else the link would be neither connected nor refused, and nobody told of its end.
+TEST_F(HostileClient, ThatRefusesItsPeerForNoReasonIsGivenOne) {
+  const auto segment = raw_input_segment();
+  { auto closed = std::move(in_); }
+  const shm::Bell bell;
+  RawClient refusing = client();
+  refusing.send(RawClient::message(MessageKind::kOpenInput, "/in"),
+                {segment.get(), bell.write_end().get()});
+  const auto peer = refusing.expect(MessageKind::kOutputPeer);
+  auto refusal = RawClient::message(MessageKind::kPeerRefused);
+  refusal.port = peer.message.port;
+  refusal.peer = peer.message.peer;
+  refusing.send(refusal);
+  EXPECT_EQ(refusing.status()["inputs"][0]["connections"][0]["mismatch"],
+            "its component gives no reason");
+  { auto closed = std::move(out_); }
+  EXPECT_EQ(refusing.expect(MessageKind::kPeerGone).message.peer, peer.message.peer);
+  auto close = RawClient::message(MessageKind::kClosePort);
+  close.port = peer.message.port;
+  refusing.send(close);
+  in_ = node_.input_port<int>("/in");
+  out_ = node_.output_port<int>("/out");
+}
+
 TEST_F(HostileClient, ThatObservesIsToldEachNameOnce) {
   RawClient observer = client();
   observer.send(RawClient::message(MessageKind::kObserve));

@@ -45,6 +45,26 @@ struct Pipe {
   shm::FileDescriptor read, write;
 };
 
+// While it lives, no file grows beyond that size.
+class FullDisk {
+ public:
+  explicit FullDisk(rlim_t size) : ignored_(::signal(SIGXFSZ, SIG_IGN)) {
+    if (::getrlimit(RLIMIT_FSIZE, &before_) != 0) throw std::runtime_error("getrlimit");
+    const rlimit small{size, before_.rlim_max};
+    if (::setrlimit(RLIMIT_FSIZE, &small) != 0) throw std::runtime_error("setrlimit");
+  }
+  FullDisk(const FullDisk&) = delete;
+  FullDisk& operator=(const FullDisk&) = delete;
+  ~FullDisk() {
+    ::setrlimit(RLIMIT_FSIZE, &before_);
+    ::signal(SIGXFSZ, ignored_);
+  }
+
+ private:
+  rlimit before_{};
+  void (*ignored_)(int);
+};
+
 TEST(LogShares, AUserMayCauseABurstOfLinesAndThenOneForEachInterval) {
   LogShares shares;
   for (std::uint32_t i = 0; i < LogShares::kMaxBurst; ++i) ASSERT_TRUE(shares.take(1, kStart));
@@ -120,6 +140,23 @@ TEST(LogWriter, LinesThatWereLostAreCountedWhereTheyWouldHaveStood) {
   }
   EXPECT_LT(written, put);
   EXPECT_EQ(written + lost, put);
+}
+
+TEST(LogWriter, LinesThatAFileDoesNotTakeAreCountedOnceItTakesThem) {
+  const test::TemporaryDirectory directory;
+  const std::string path = directory.write("log", "");
+  const shm::FileDescriptor file(::open(path.c_str(), O_WRONLY | O_APPEND | O_CLOEXEC));
+  LogWriter writer(file.get());
+  writer.put("one\n");
+  {
+    const FullDisk disk(6);
+    writer.put("two\n");
+    writer.put("three\n");
+  }
+  writer.put("four\n");
+  writer.put("five\n");
+  EXPECT_EQ(test::content_of(path),
+            "one\ntw\n[log] 2 lines were lost here: the file took none\nfour\nfive\n");
 }
 
 TEST(LogWriter, WhatWasSaidIsWrittenBeforeItEnds) {

@@ -1,4 +1,5 @@
 // Who has a port's name, where its component closes it or dies and the daemon hears of it late.
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/syscall.h>
 #include <sys/wait.h>
@@ -65,6 +66,39 @@ TEST(Names, AreFreeInTheOrderInWhichComponentsSpoke) {
     daemon.process().signal(SIGCONT);
     EXPECT_NO_THROW(second.expect(MessageKind::kOpened));
   }
+}
+
+// Its conversation ends, and it lives: it may come back for them.
+TEST(Names, OfAComponentThatIsLostAreKeptThoughAnotherAsksAtOnce) {
+  Daemon daemon;
+  RawClient lost(daemon.instance());
+  lost.hello("lost", wire::kComesBack);
+  const auto segment = raw_output_segment();
+  open_raw_output(lost, "/x", segment);
+  RawClient asking(daemon.instance());
+  asking.hello("asking");
+  wait_until_it_sleeps_in(SYS_epoll_wait, daemon.process().pid(), daemon.process().pid());
+  daemon.process().stop();
+  asking.send(open_untyped("/x"), {segment.get(), -1});
+  lost.hang_up();
+  daemon.process().signal(SIGCONT);
+  EXPECT_THROW(asking.expect(MessageKind::kOpened), std::runtime_error);
+  EXPECT_TRUE(daemon.source("/x")["away"]);
+}
+
+// As a program finds that its process has executed: the process lives, and its ports are kept.
+TEST(Names, OfAProgramBeforeInTheSameProcessAreKeptAndItIsTold) {
+  Daemon daemon;
+  const auto segment = raw_output_segment();
+  {
+    RawClient before(daemon.instance());
+    before.hello("before", wire::kComesBack);
+    open_raw_output(before, "/x", segment);
+  }
+  RawClient after(daemon.instance());
+  after.hello("after");
+  after.send(open_untyped("/x"), {segment.get(), -1});
+  EXPECT_THAT(after.expect_refusal(), testing::HasSubstr("end the process and start anew"));
 }
 
 }  // namespace

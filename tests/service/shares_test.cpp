@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "service/clients/client.hpp"
+#include "service/policy/headroom.hpp"
 #include "service/clients/turns.hpp"
 #include "shm/segment.hpp"
 #include "wire/errands.hpp"
@@ -123,6 +124,26 @@ TEST(Shares, ARefusalSaysWhatIsTheLimitAndWhatToDo) {
     EXPECT_THAT(limit.what(), HasSubstr("--user-share"));
     EXPECT_THAT(limit.what(), HasSubstr("close some"));
   }
+}
+
+TEST(Shares, PromiseNoDescriptorThatMessagesMayNeed) {
+  const Totals totals = totals_of_this_process();
+  EXPECT_LT(totals[static_cast<std::size_t>(Share::kDescriptors)],
+            Headroom::of_the_process().limit());
+}
+
+TEST(Shares, PassFromTheDaemonToAUserAsFarAsTheyAreHis) {
+  Shares shares(of_each(1600), 50, kDaemonsUser);
+  Charge one = shares.take_own(Share::kInputs, 700);
+  Charge other = shares.take_own(Share::kInputs, 100);
+  shares.pass_to(kOne, one, 100);
+  EXPECT_TRUE(one.is_own());
+  shares.pass_to(kOne, one);
+  EXPECT_TRUE(one.is_of(kOne));
+  shares.pass_to(kTwo, one);
+  EXPECT_TRUE(one.is_of(kOne));
+  shares.pass_to(kOne, other);
+  EXPECT_TRUE(other.is_own());
 }
 
 TEST(Turns, AreByUserHoweverManyOfHisClientsWait) {

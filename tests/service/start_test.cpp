@@ -6,6 +6,7 @@
 
 #include <arbiter/arbiter.hpp>
 
+#include "shm/limits.hpp"
 #include "tests/service/impatient.hpp"
 #include "tests/support/daemon.hpp"
 #include "tests/support/run_program.hpp"
@@ -77,6 +78,27 @@ TEST(Start, SaysHowSeveralFilesOfOneModelAreGiven) {
       << unnamed.err;
   const auto half = arbiterd({"--check", "--model", "work=" + cart + ",none"});
   EXPECT_EQ(half.err.find("write:"), std::string::npos) << half.err;
+}
+
+// Each alone could be loaded.
+TEST(Start, IsNotPromisedForModelsThatTogetherNameTooMuch) {
+  const TemporaryDirectory directory;
+  std::vector<std::string> check{"--check"};
+  for (const std::string name : {"one", "other"}) {
+    std::string text = "<behaviors>";
+    for (std::uint32_t i = 0; i <= shm::kMaxInputPorts / 2; ++i) {
+      text += "<arbiter at='/" + name + std::to_string(i) + "'><select from='/out" +
+              std::to_string(i / shm::kMaxDestinations) + "'/></arbiter>";
+    }
+    check.insert(check.end(),
+                 {"--model", name + "=" + directory.write(name + ".xml", text + "</behaviors>")});
+  }
+  const auto result = arbiterd(check);
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_NE(result.err.find("the models together name 4098 input ports, and an instance has at most "
+                            "4096"),
+            std::string::npos)
+      << result.err;
 }
 
 // As a daemon would find them, but nobody is served.

@@ -42,7 +42,7 @@ class StoredPages : public testing::Test {
            shm::reopen(source.page.writable, O_RDWR)});
     }
     successors_board_.inherit(board_.readable());
-    successors_.restore(0);
+    successors_.restore(board_.in_use());
   }
 
   struct Stored {

@@ -3,10 +3,14 @@
 
 #include <atomic>
 #include <chrono>
+#include <string>
 #include <thread>
+#include <vector>
 
 #include <arbiter/arbiter.hpp>
 
+#include "service/kept/descriptor_store.hpp"
+#include "shm/segment.hpp"
 #include "tests/client/component.hpp"
 #include "tests/client/models.hpp"
 #include "tests/client/samples.hpp"
@@ -253,6 +257,24 @@ TEST(Takeover, ByTheDescriptorStoreKeepsActivityThoughNobodyIsThere) {
   auto low = node.output_port<Number>("/low");
   auto in = node.input_port<Number>("/in");
   EXPECT_EQ(low.publish(Number{1}).delivered, 0u);
+}
+
+// What stayed would stand beside pages of the same names, and with it they would be given up.
+TEST(Takeover, ByADescriptorStoreThatIsOfNoUseEmptiesIt) {
+  Daemon::Options options;
+  options.arguments = {"--descriptor-store"};
+  Daemon daemon(override_model(), options);
+  ASSERT_EQ(daemon.notify().stored().count("page-2-1"), 1u);
+  daemon.kill();
+  {
+    const ScopedVariable notify("NOTIFY_SOCKET", daemon.notify().path());
+    service::store("registry", shm::make_segment("of another version", 4096));
+  }
+  daemon.write_model(single_model());
+  daemon.restart_with_stored();
+  std::vector<std::string> names;
+  for (const auto& [name, descriptor] : daemon.notify().stored()) names.push_back(name);
+  EXPECT_EQ(names, (std::vector<std::string>{"board", "page-0-1", "registry"})) << daemon.log();
 }
 
 }  // namespace

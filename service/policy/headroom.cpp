@@ -1,4 +1,4 @@
-#include "service/clients/headroom.hpp"
+#include "service/policy/headroom.hpp"
 
 #include <algorithm>
 
