@@ -181,6 +181,8 @@ TEST_F(AFormerOwner, CannotBringBackWhatAnOperatorHasEnded) {
 
 // Whoever flips his activity is inactive now and then.
 TEST_F(AFormerOwner, CannotBringBackWhatAnOperatorFoundInactive) {
+  stranger_->tell('s');
+  stranger_->tell('d');
   take_it_away();
   Robot robot;
   auto& [node, drive, motor] = robot;
