@@ -25,7 +25,8 @@ bool is_regular_file(int fd) {
 }
 
 // What cannot be written at all (the reader has closed its end, or nothing is taken) is given up.
-void write_all(int fd, const std::string& text) {
+// How many bytes were written.
+std::size_t write_all(int fd, const std::string& text) {
   std::size_t done = 0;
   while (done < text.size()) {
     const ssize_t written = ::write(fd, text.data() + done, text.size() - done);
@@ -34,11 +35,16 @@ void write_all(int fd, const std::string& text) {
       continue;
     }
     // That nothing was written is no error, and sets no errno.
-    if (written == 0 || (errno != EINTR && errno != EAGAIN)) return;
+    if (written == 0 || (errno != EINTR && errno != EAGAIN)) break;
     if (errno == EINTR) continue;
     pollfd writable{fd, POLLOUT, 0};  // somebody has made it non-blocking for all
     ::poll(&writable, 1, -1);
   }
+  return done;
+}
+
+std::string say_lost(std::uint64_t lines, const char* why) {
+  return std::to_string(lines) + " lines were lost here: " + why;
 }
 
 }  // namespace
@@ -62,7 +68,9 @@ struct LogWriter::Shared {
   std::uint64_t lost = 0;  // lines that did not fit, since the last that did
   bool is_writing = false;
   bool is_ending = false;
-  bool has_ended = false;  // all is written
+  bool has_ended = false;       // all is written
+  std::uint64_t unwritten = 0;  // lines that a file did not take, since the last that it did
+  bool is_torn = false;         // the last of these it took in part
 
   void add(Line line) {
     bytes_waiting += line.bytes();
@@ -71,6 +79,8 @@ struct LogWriter::Shared {
   void add_loss();
   [[nodiscard]] bool is_done() const { return waiting.empty() && lost == 0 && !is_writing; }
   void write(const std::vector<Line>& lines) const;
+  void write_to_file(const std::string& line);
+  bool append(const std::string& line);
   void run();
 };
 
@@ -83,10 +93,29 @@ void LogWriter::Shared::write(const std::vector<Line>& lines) const {
   write_all(fd, text);
 }
 
+// The disk may be full for a while.
+void LogWriter::Shared::write_to_file(const std::string& line) {
+  if (unwritten != 0) {
+    if (!append((is_torn ? "\n" : "") + begin + say_lost(unwritten, "the file took none") + "\n")) {
+      ++unwritten;
+      return;
+    }
+    unwritten = 0;
+  }
+  if (!append(line)) ++unwritten;
+}
+
+// Whether the file took all of it.
+bool LogWriter::Shared::append(const std::string& line) {
+  const std::size_t done = write_all(fd, line);
+  if (done != 0) is_torn = line[done - 1] != '\n';
+  return done == line.size();
+}
+
 void LogWriter::Shared::add_loss() {
   const std::uint64_t lines = std::exchange(lost, 0);
   if (lines == 0) return;
-  const std::string text = std::to_string(lines) + " lines were lost here: nobody read the log";
+  const std::string text = say_lost(lines, "nobody read the log");
   add({begin + text + "\n", journal ? journal_record(text, kWarningPriority) : std::string()});
 }
 
@@ -153,7 +182,7 @@ void LogWriter::put(std::string line, std::string record) {
   const std::lock_guard lock(shared_->mutex);
   if (shared_->is_ending) return;
   if (!needs_reader_) {
-    write_all(shared_->fd, line);
+    shared_->write_to_file(line);
     return;
   }
   start();

@@ -1,5 +1,5 @@
 // Writes lines to a descriptor, from a thread of its own; to a regular file at once, for nobody has
-// to read that.
+// to read that. Lines that the file does not take, as on a full disk, are counted too.
 //
 // Standard error may be a pipe that nobody reads, a terminal that somebody has stopped, or a
 // journal that hangs: write() then blocks for as long as they like. No loop and no thread of

@@ -248,10 +248,10 @@ class PolicyReader {
       if (!on_ports) {
         error("stray-word", glob,
               quote(glob) + " stands behind " + quote(actions) +
-                  (actions == "all" ? ", which is on every port and takes no pattern; name the "
-                                      "actions, such as output,input"
-                                    : ", which is about no port; remove it") +
-                  ", or write # before a comment");
+                  (actions == "all" ? ", which is on every port and takes no pattern; write # "
+                                      "before a comment, or name the actions, such as output,input"
+                                    : ", which is about no port; remove it, or write # before a "
+                                      "comment"));
         return false;
       }
       if (!glob.starts_with('/') && !glob.starts_with('*')) {

@@ -5,8 +5,10 @@
 #include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 #include <unistd.h>
 
+#include <csignal>
 #include <sstream>
 #include <thread>
 
@@ -14,6 +16,7 @@
 #include "service/log/log_sink.hpp"
 #include "tests/support/daemon.hpp"
 #include "tests/support/raw_client.hpp"
+#include "tests/support/text_files.hpp"
 
 namespace arbiter::service {
 namespace {

@@ -212,8 +212,9 @@ TEST(Policy, TellsEveryMistakeWithItsPlace) {
       {"allow user alice stop,all", "1:23 error unknown-action: \"all\" is no action; all stands"},
       {"allow user alice stop /x", "1:23 error stray-word: \"/x\" stands behind \"stop\""},
       {"allow user alice all /Arm/*",
-       "1:22 error stray-word: \"/Arm/*\" stands behind \"all\", which is on every port and takes no "
-       "pattern; name"},
+       "1:22 error stray-word: \"/Arm/*\" stands behind \"all\", which is on every port and takes "
+       "no "
+       "pattern; write #"},
       {"allow user alice stop,output /x", "1:18 error mixed-actions"},
       {"allow user alice output", "1:24 error missing-glob"},
       {"allow user alice output # /x", "1:29 error missing-glob"},

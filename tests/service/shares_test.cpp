@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "service/clients/client.hpp"
-#include "service/policy/headroom.hpp"
 #include "service/clients/turns.hpp"
+#include "service/policy/headroom.hpp"
 #include "shm/segment.hpp"
 #include "wire/errands.hpp"
 

@@ -95,9 +95,10 @@ TEST(Start, IsNotPromisedForModelsThatTogetherNameTooMuch) {
   }
   const auto result = arbiterd(check);
   EXPECT_EQ(result.exit_code, 1);
-  EXPECT_NE(result.err.find("the models together name 4098 input ports, and an instance has at most "
-                            "4096"),
-            std::string::npos)
+  EXPECT_NE(
+      result.err.find("the models together name 4098 input ports, and an instance has at most "
+                      "4096"),
+      std::string::npos)
       << result.err;
 }
 
