@@ -23,6 +23,11 @@ using testing::HasSubstr;
 class Replay : public testing::Test {
  protected:
   // /low 1, /high 2, /low 3 (loses), /high gives up, /low 4; /text "abc".
+  // Of the recorder, at the port that is open now.
+  void await_tap() {
+    await(
+        [&] { return daemon_.source("/low").value("taps", nlohmann::json::array()).size() == 1; });
+  }
   std::string record(const std::vector<std::string>& more = {"--payloads", "all"}) {
     Node node("test");
     auto in = node.input_port<Number>("/p", {.depth = 16});
@@ -172,13 +177,22 @@ TEST_F(Replay, RefusesWhatHasNoPayload) {
 TEST_F(Replay, MakesSignalsOfSamplesOfAnotherType) {
   Node node("test");
   Recording recording(daemon_, {"--payloads", "all"});
-  node.output_port<Number>("/low").publish(Number{1});
+  {
+    auto low = node.output_port<Number>("/low");
+    await_tap();
+    low.publish(Number{1});
+  }
   const Type other("test/Other", sizeof(Number), alignof(Number));
   {
     auto low = node.output_port("/low", other);
+    await_tap();
     low.publish(Bytes(std::array<std::byte, sizeof(Number)>{}.data(), sizeof(Number)));
   }
-  node.output_port<Number>("/low").signal();
+  {
+    auto low = node.output_port<Number>("/low");
+    await_tap();
+    low.signal();
+  }
   EXPECT_EQ(recording.end(), 0) << recording.error();
   auto tap = node.tap("/low");
   const auto result = arbiter({"replay", recording.file(), "--as-fast-as-possible"});
@@ -199,6 +213,7 @@ TEST_F(Replay, PublishesSamplesOfAnySizeAgain) {
   Recording recording(daemon_, {"--payloads", "all"});
   {
     auto low = node.output_port("/low", Type::variable("test/Text", 16));
+    await_tap();
     for (const std::size_t size : {3u, 16u}) {
       low.publish(Bytes(std::array<std::byte, 16>{}.data(), size));
     }
