@@ -85,7 +85,7 @@ TEST(Tap, GoesOnBesideOthersUnderADaemonThatHasBegunAnew) {
   outputs.emplace("/low", node.output_port<Number>("/low"));
   await([&] {
     watcher.service();
-    return daemon.source("/low").value("taps", nlohmann::json::array()).size() == 1;
+    return daemon.taps_of("/low") == 1;
   });
   for (const std::string name : {"/high", "/stop"}) {
     outputs.emplace(name, node.output_port<Number>(name));
@@ -247,10 +247,6 @@ TEST(Tap, GoesOnUnderAnotherDaemon) {
   EXPECT_EQ(tap.lost(), 0u);
 }
 
-std::size_t taps_of(Daemon& daemon, const std::string& source) {
-  return daemon.source(source).value("taps", nlohmann::json::array()).size();
-}
-
 // By the time that its program has it, the daemon that opened it has gone, and another has come.
 TEST(Tap, OpenedByADaemonThatIsReplacedAtOnceIsKnownToTheNext) {
   Daemon daemon(single_model());
@@ -277,7 +273,7 @@ TEST(Tap, OpenedByADaemonThatIsReplacedAtOnceIsKnownToTheNext) {
   ASSERT_TRUE(is_replaced);
   await([&] { return daemon.source("/out")["open"] == true; });
   auto last = node.input_port<Number>("/last");  // what the node has said before has been heard
-  EXPECT_EQ(taps_of(daemon, "/out"), 1u);
+  EXPECT_EQ(daemon.taps_of("/out"), 1u);
 }
 
 }  // namespace

@@ -25,8 +25,7 @@ class Replay : public testing::Test {
   // /low 1, /high 2, /low 3 (loses), /high gives up, /low 4; /text "abc".
   // Of the recorder, at the port that is open now.
   void await_tap() {
-    await(
-        [&] { return daemon_.source("/low").value("taps", nlohmann::json::array()).size() == 1; });
+    await([&] { return daemon_.taps_of("/low") == 1; });
   }
   std::string record(const std::vector<std::string>& more = {"--payloads", "all"}) {
     Node node("test");

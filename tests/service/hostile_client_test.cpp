@@ -17,7 +17,6 @@
 #include "tests/support/await.hpp"
 #include "tests/support/daemon.hpp"
 #include "tests/support/raw_port.hpp"
-#include "tests/support/threads.hpp"
 
 namespace arbiter::test {
 namespace {
@@ -50,6 +49,22 @@ class HostileClient : public testing::Test {
     return hostile.expect_refusal();
   }
 
+  // The input port, in the place of the one that goes on. Returns what it is told of /out.
+  wire::Message open_in_its_place(RawClient& hostile) {
+    { auto closed = std::move(in_); }
+    const auto segment = raw_input_segment();
+    hostile.send(RawClient::message(MessageKind::kOpenInput, "/in"),
+                 {segment.get(), bell_.write_end().get()});
+    return hostile.expect(MessageKind::kOutputPeer).message;
+  }
+  void give_back(RawClient& hostile, shm::PortInstance port) {
+    auto close = RawClient::message(MessageKind::kClosePort);
+    close.port = port;
+    hostile.send(close);
+    in_ = node_.input_port<int>("/in");
+  }
+
+  const shm::Bell bell_;  // of a hostile one's input port
   Daemon daemon_{kOneSource};
   Node node_{"good"};
   OutputPort<int> out_ = node_.output_port<int>("/out");
@@ -310,50 +325,34 @@ TEST_F(HostileClient, CannotBeMoreThanTheLimitOfItsUser) {
 }
 
 TEST_F(HostileClient, ThatRefusesItsPeerIsNotDeliveredTo) {
-  const auto segment = raw_input_segment();
-  { auto closed = std::move(in_); }
-  const shm::Bell bell;
   RawClient refusing = client();
-  refusing.send(RawClient::message(MessageKind::kOpenInput, "/in"),
-                {segment.get(), bell.write_end().get()});
-  const auto peer = refusing.expect(MessageKind::kOutputPeer);
+  const wire::Message peer = open_in_its_place(refusing);
   refusing.expect(MessageKind::kConnected);
   EXPECT_EQ(out_.publish(1).delivered, 1u);
   auto refusal = RawClient::message(MessageKind::kPeerRefused);
-  refusal.port = peer.message.port;
-  refusal.peer = peer.message.peer;
+  refusal.port = peer.port;
+  refusal.peer = peer.peer;
   refusal.set_text("no memory");
   refusing.send(refusal);
   EXPECT_EQ(refusing.status()["inputs"][0]["connections"][0]["mismatch"], "no memory");
   { auto elsewhere = node_.input_port<int>("/elsewhere"); }  // the node has heard of it by now
   EXPECT_EQ(out_.publish(2).delivered, 0u);
-  auto close = RawClient::message(MessageKind::kClosePort);
-  close.port = peer.message.port;
-  refusing.send(close);
-  in_ = node_.input_port<int>("/in");
+  give_back(refusing, peer.port);
 }
 
 // Else the link would be neither connected nor refused, and nobody told of its end.
 TEST_F(HostileClient, ThatRefusesItsPeerForNoReasonIsGivenOne) {
-  const auto segment = raw_input_segment();
-  { auto closed = std::move(in_); }
-  const shm::Bell bell;
   RawClient refusing = client();
-  refusing.send(RawClient::message(MessageKind::kOpenInput, "/in"),
-                {segment.get(), bell.write_end().get()});
-  const auto peer = refusing.expect(MessageKind::kOutputPeer);
+  const wire::Message peer = open_in_its_place(refusing);
   auto refusal = RawClient::message(MessageKind::kPeerRefused);
-  refusal.port = peer.message.port;
-  refusal.peer = peer.message.peer;
+  refusal.port = peer.port;
+  refusal.peer = peer.peer;
   refusing.send(refusal);
   EXPECT_EQ(refusing.status()["inputs"][0]["connections"][0]["mismatch"],
             "its component gives no reason");
   { auto closed = std::move(out_); }
-  EXPECT_EQ(refusing.expect(MessageKind::kPeerGone).message.peer, peer.message.peer);
-  auto close = RawClient::message(MessageKind::kClosePort);
-  close.port = peer.message.port;
-  refusing.send(close);
-  in_ = node_.input_port<int>("/in");
+  EXPECT_EQ(refusing.expect(MessageKind::kPeerGone).message.peer, peer.peer);
+  give_back(refusing, peer.port);
   out_ = node_.output_port<int>("/out");
 }
 
@@ -373,47 +372,6 @@ TEST_F(HostileClient, ThatObservesIsToldEachNameOnce) {
   wire::Received next;
   ASSERT_TRUE(observer.receive(next));
   EXPECT_EQ(next.message.kind, MessageKind::kDone) << "there is no more to tell";
-}
-
-TEST(Descriptors, WhenTheyRunOutClientsAreTurnedAwayAndTheDaemonRests) {
-  Daemon daemon(kOneSource, {.max_descriptors = 64});
-  Node node("test");
-  {
-    std::vector<RawClient> many;
-    for (int i = 0; i < 80; ++i) many.emplace_back(daemon.instance());
-    wire::Received received;
-    EXPECT_FALSE(many.back().receive(received)) << "turned away";
-    wait_until_it_sleeps_in(SYS_epoll_wait, daemon.process().pid(), daemon.process().pid());
-  }
-  Node other("other");
-  auto out = other.output_port<int>("/out");
-  auto in = node.input_port<int>("/in");
-  EXPECT_EQ(out.publish(1).delivered, 1u);
-}
-
-TEST(Descriptors, WhenTheyRunOutPortsAreRefusedAndWhoIsConnectedStays) {
-  Daemon daemon(kNoRules, {.max_descriptors = 128});
-  Node node("test");
-  std::vector<OutputPort<int>> ports;
-  std::string why;
-  while (why.empty() && ports.size() < 64) {
-    try {
-      ports.push_back(node.output_port<int>("/" + std::to_string(ports.size())));
-    } catch (const Error& error) {
-      why = error.what();
-    }
-  }
-  EXPECT_NE(why.find("limit-exceeded: user"), std::string::npos) << why;
-  EXPECT_NE(why.find("RLIMIT_NOFILE"), std::string::npos) << why;
-  const std::size_t most = ports.size();
-  EXPECT_GT(most, 4u);
-  for (const char* gone : {" left, ", " left\n"}) {
-    EXPECT_EQ(daemon.log().find(gone), std::string::npos) << "nobody was dropped";
-  }
-  const std::size_t used = daemon.open_descriptors();
-  ports.pop_back();
-  await([&] { return daemon.open_descriptors() < used; });  // a thread closes what it was
-  ports.push_back(node.output_port<int>("/" + std::to_string(most - 1)));
 }
 
 }  // namespace

@@ -192,6 +192,10 @@ class Daemon {
     return client.status();
   }
   nlohmann::json source(const std::string& name) { return named(status()["sources"], name); }
+  // Of an output port, by the status.
+  std::size_t taps_of(const std::string& name) {
+    return source(name).value("taps", nlohmann::json::array()).size();
+  }
   nlohmann::json input(const std::string& name) { return named(status()["inputs"], name); }
   nlohmann::json connection(const std::string& from, const std::string& to) {
     const nlohmann::json port = input(to);
