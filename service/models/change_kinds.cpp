@@ -184,27 +184,29 @@ void ModelChanges::ask_ahead(Change change, const Client& client, const wire::Me
   answer_done(swap, nullptr);
 }
 
+// Where a rollback names none.
+std::string ModelChanges::why_none_before() const {
+  const PastModel* const latest = history_.latest();
+  if (latest == nullptr) return "there is no model to go back to: none has been in force";
+  if (history_.begins_with_predecessor()) {
+    return "there is no model to go back to: this daemon keeps none from before its start";
+  }
+  const std::string generation = "model " + std::to_string(latest->generation);
+  const std::string content = "model " + std::to_string(latest->content);
+  if (history_.find(latest->content) == nullptr) {
+    return "there is no older model to go back to: " + generation + " decides as " + content +
+           " did, which has left the history; arbiter history shows what is in it";
+  }
+  return (latest->generation == latest->content
+              ? content + " is the oldest that is kept"
+              : generation + " decides as " + content + " does, the oldest that is kept") +
+         "; arbiter history shows all";
+}
+
 // The one to go back to. Throws std::runtime_error saying why there is none.
 const PastModel& ModelChanges::past_model(std::uint64_t asked) const {
   const PastModel* const past = asked == 0 ? history_.previous() : history_.find(asked);
-  if (past == nullptr && asked == 0) {
-    const PastModel* const oldest = history_.latest();
-    if (oldest == nullptr) {
-      throw std::runtime_error("there is no model to go back to: none has been in force");
-    }
-    const PastModel* const first = history_.find(oldest->content);
-    if (first != nullptr && first->how == kInherited) {
-      throw std::runtime_error(
-          "there is no model to go back to: this daemon keeps none from before its start");
-    }
-    const std::string content = std::to_string(oldest->content);
-    const std::string is_oldest = oldest->generation == oldest->content
-                                      ? "model " + content + " is the oldest that is kept"
-                                      : "model " + std::to_string(oldest->generation) +
-                                            " decides as model " + content +
-                                            " does, the oldest that is kept";
-    throw std::runtime_error(is_oldest + "; arbiter history shows all");
-  }
+  if (past == nullptr && asked == 0) throw std::runtime_error(why_none_before());
   if (past == nullptr) {
     throw std::runtime_error("model " + std::to_string(asked) +
                              " is not in the history; arbiter history shows what is");

@@ -17,6 +17,11 @@ std::int64_t calendar_ms() {
 
 void History::add(PastModel entry) {
   if (entry.content == 0) entry.content = entry.generation;
+  if (entry.how == kInherited) {
+    has_inherited_ = true;
+  } else {
+    first_own_ = std::min(first_own_, entry.generation);
+  }
   models_.push_back(std::move(entry));
   if (models_.size() > kMaxEntries) models_.pop_front();
   forget_what_does_not_fit();
@@ -56,6 +61,10 @@ const PastModel* History::previous() const {
     return entry.generation < models_.back().content;
   });
   return before == models_.rend() ? nullptr : &*before;
+}
+
+bool History::begins_with_predecessor() const {
+  return has_inherited_ && models_.back().content <= first_own_;
 }
 
 wire::PastModelStatus status_of(const PastModel& entry) {

@@ -19,8 +19,8 @@ inline constexpr char kInherited[] = "takeover";
 // One that came into force.
 struct PastModel {
   std::uint64_t generation = 0;
-  // The first generation in the history whose content this is; another for a rollback, and for a
-  // reload or a switch that changed nothing.
+  // The first generation whose content this is, be it in the history or not any longer; another
+  // for a rollback, and for a reload or a switch that changed nothing.
   std::uint64_t content = 0;
   std::string name;
   rules::ModelFiles files;
@@ -58,6 +58,9 @@ class History {
   // Where a rollback goes that names no generation: to what was in force before the latest; after
   // a rollback one step further back. Null: nowhere.
   [[nodiscard]] const PastModel* previous() const;
+  // Whether all that was in force before that content of the latest was a predecessor's, be it in
+  // the history or not any longer.
+  [[nodiscard]] bool begins_with_predecessor() const;
   // The latest first.
   [[nodiscard]] std::vector<wire::PastModelStatus> status() const;
 
@@ -66,6 +69,8 @@ class History {
 
   std::size_t max_bytes_;
   std::deque<PastModel> models_;  // the oldest first
+  bool has_inherited_ = false;
+  std::uint64_t first_own_ = UINT64_MAX;  // generation that no predecessor had in force
 };
 
 }  // namespace arbiter::service

@@ -117,6 +117,7 @@ class ModelChanges {
   [[nodiscard]] const LoadedModel& loaded_model(const std::string& name) const;
   void prepare_rollback(Swap& swap);
   [[nodiscard]] const PastModel& past_model(std::uint64_t asked) const;
+  [[nodiscard]] std::string why_none_before() const;
   void prepare_comparison(Swap& swap);
   void finish_comparison(const Swap& swap, const Reading& reading);
   [[nodiscard]] Swap first_swap();

@@ -10,6 +10,7 @@
 
 #include <arbiter/arbiter.hpp>
 
+#include "service/models/history.hpp"
 #include "tests/cli/arbiter_program.hpp"
 #include "tests/client/models.hpp"
 #include "tests/client/samples.hpp"
@@ -274,6 +275,17 @@ TEST_F(ChangingModels, RollbackGoesBackStepByStepOrToOneByItsNumber) {
   EXPECT_EQ(daemon.generation(), 6u);
   ASSERT_EQ(arbiter({"reload"}).exit_code, 0);
   EXPECT_EQ(source_in_force(), "/c") << "what the file says";
+}
+
+TEST_F(ChangingModels, ARollbackNamesNoModelThatHasLeftTheHistory) {
+  start();
+  for (std::size_t i = 0; i < service::History::kMaxEntries; ++i) {
+    ASSERT_EQ(arbiter({"reload"}).exit_code, 0);
+  }
+  expect_refusal(
+      arbiter({"rollback"}),
+      "there is no older model to go back to: model 17 decides as model 1 did, which has "
+      "left the history; arbiter history shows what is in it");
 }
 
 // What is in force after a rollback is not the object that the library has.

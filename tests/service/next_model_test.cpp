@@ -3,6 +3,7 @@
 
 #include <arbiter/arbiter.hpp>
 
+#include "service/models/history.hpp"
 #include "tests/client/component.hpp"
 #include "tests/client/samples.hpp"
 #include "tests/service/changing_models.hpp"
@@ -70,6 +71,21 @@ TEST_F(ChangingModels, ADaemonKilledInTheMiddleOfASwitchLeavesOneOfTheTwo) {
     EXPECT_EQ(a.publish(Number{1}).delivered, is_other ? 0u : 1u);
     EXPECT_EQ(b.publish(Number{2}).delivered, is_other ? 1u : 0u);
   }
+}
+
+TEST_F(ChangingModels, ARollbackSaysThatModelsBeforeTheStartAreGoneThoughTheirNamesAreToo) {
+  Daemon& daemon = start();
+  Node node("test");
+  auto in = node.input_port<Number>("/in");
+  daemon.kill();
+  daemon.restart();
+  expect_refusal(arbiter({"rollback"}),
+                 "model 1 was in force before this daemon started; only its name is known");
+  for (std::size_t i = 0; i < service::History::kMaxEntries; ++i) {
+    ASSERT_EQ(arbiter({"reload"}).exit_code, 0);
+  }
+  expect_refusal(arbiter({"rollback"}),
+                 "there is no model to go back to: this daemon keeps none from before its start");
 }
 
 // A robot comes back by itself: what somebody has half written does not keep it from that.
