@@ -64,8 +64,10 @@ void Switchboard::insert(std::unique_ptr<InputPort> port, Client& client, InputN
 }
 
 void Switchboard::remove(shm::PortInstance port) {
-  for (auto link = links_.begin(); link != links_.end();) {
+  const bool is_output = outputs_.contains(port);
+  for (auto link = first_link(port); link != links_.end();) {
     const auto [output, input] = link->first;
+    if (is_output && output != port) break;
     if (output != port && input != port) {
       ++link;
       continue;
@@ -93,11 +95,17 @@ void Switchboard::remove(shm::PortInstance port) {
   erase(port);
 }
 
+// Those of an output port stand together.
+Switchboard::LinkMap::iterator Switchboard::first_link(shm::PortInstance port) {
+  return outputs_.contains(port) ? links_.lower_bound({port, 0}) : links_.begin();
+}
+
 void Switchboard::erase(shm::PortInstance port) {
   ARBITER_ASSERT(outputs_.count(port) + inputs_.count(port) == 1, "a port is closed twice");
   const auto link = links_.lower_bound({port, 0});
   ARBITER_ASSERT(link == links_.end() || link->first.first != port,
                  "a port has links when it is closed");
+  for (const auto& [peer, claim] : claims_of(port)) claimed_.erase({peer, port});
   if (const auto found = outputs_.find(port); found != outputs_.end()) {
     ARBITER_ASSERT(found->second->source->open == port,
                    "a port is closed that is not its source's");

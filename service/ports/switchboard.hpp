@@ -7,6 +7,7 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <optional>
 #include <set>
 #include <string>
 #include <utility>
@@ -115,6 +116,7 @@ class Switchboard {
 
  private:
   using Wanted = std::map<LinkKey, LinkKind>;
+  using LinkMap = std::map<LinkKey, Link>;
   void want_links(const OutputPort& output, const shm::TableView& table, Wanted& wanted) const;
   void want_links(const InputPort& input, const shm::TableView& table, Wanted& wanted) const;
   void make_links(const Wanted& wanted, Told& told);
@@ -134,7 +136,9 @@ class Switchboard {
   void insert(std::unique_ptr<OutputPort> port, Client& client, Source& source);
   void insert(std::unique_ptr<InputPort> port, Client& client, InputName& name);
   void erase(shm::PortInstance port);
+  LinkMap::iterator first_link(shm::PortInstance port);
   void settle(OutputPort& output, InputPort& input);
+  std::optional<std::uint64_t> take_claim(shm::PortInstance port, shm::PortInstance peer);
   [[nodiscard]] Claims& claims_of(shm::PortInstance port) const;
   [[nodiscard]] Client& client_of(shm::PortInstance port) const;
 
@@ -142,7 +146,10 @@ class Switchboard {
   Registry& registry_;
   std::map<shm::PortInstance, std::unique_ptr<OutputPort>> outputs_;
   std::map<shm::PortInstance, std::unique_ptr<InputPort>> inputs_;
-  std::map<LinkKey, Link> links_;
+  LinkMap links_;
+  // Who claims a link with whom, the one that is claimed first: many ports may end at once, and
+  // others wait meanwhile.
+  std::set<std::pair<shm::PortInstance, shm::PortInstance>> claimed_;
   Taps taps_;
   std::vector<LinkKey> fresh_;  // links whose receivers are to be shown the segment
   std::set<LinkKey> growth_;    // links whose receivers are to be shown that it has grown

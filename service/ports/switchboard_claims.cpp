@@ -12,38 +12,25 @@
 #include "shm/bell.hpp"
 
 namespace arbiter::service {
-namespace {
-
-// Takes a claim out: its number, 0 where it is not one of a connection, nothing where there is
-// none.
-std::optional<std::uint64_t> take(Claims& claims, shm::PortInstance peer) {
-  const auto found = claims.find(peer);
-  if (found == claims.end()) return {};
-  const std::uint64_t number = found->second.number;
-  claims.erase(found);
-  return number;
-}
-
-}  // namespace
 
 Charge Switchboard::set_away(shm::PortInstance port) {
-  for (auto link = links_.begin(); link != links_.end();) {
+  const auto found = outputs_.find(port);
+  const bool is_output = found != outputs_.end();
+  for (auto link = first_link(port); link != links_.end();) {
     const auto [output, input] = link->first;
+    if (is_output && output != port) break;
     if (output == port && (link->second.is_mutual() || link->second.is_refused())) {
-      inputs_.at(input)->claims[port] = {link->second.number};
+      claim(input, port, {link->second.number});
     }
-    if (input == port) outputs_.at(output)->claims[port] = {link->second.number};
+    if (input == port) claim(output, port, {link->second.number});
     link = output == port || input == port ? links_.erase(link) : std::next(link);
   }
   taps_.set_away(port);
-  Source* source = names_.source_of(port);
-  InputName* name = names_.input_of(port);
-  const auto output = outputs_.find(port);
-  Charge charge =
-      std::move(output == outputs_.end() ? inputs_.at(port)->charge : output->second->charge);
+  Source* const source = is_output ? found->second->source : nullptr;
+  InputName* const name = is_output ? nullptr : inputs_.at(port)->name;
+  Charge charge = std::move(is_output ? found->second->charge : inputs_.at(port)->charge);
   erase(port);
-  if (source != nullptr) source->away = port;
-  if (name != nullptr) name->away = port;
+  (is_output ? source->away : name->away) = port;
   return charge;
 }
 
@@ -68,6 +55,19 @@ Claims& Switchboard::claims_of(shm::PortInstance port) const {
 
 void Switchboard::claim(shm::PortInstance port, shm::PortInstance peer, Claim claim) {
   claims_of(port)[peer] = std::move(claim);
+  claimed_.emplace(peer, port);
+}
+
+// Takes a claim out: its number, 0 where it is not one of a connection, nothing where there is
+// none.
+std::optional<std::uint64_t> Switchboard::take_claim(shm::PortInstance port,
+                                                     shm::PortInstance peer) {
+  if (claimed_.erase({peer, port}) == 0) return {};
+  Claims& claims = claims_of(port);
+  const auto found = claims.find(peer);
+  const std::uint64_t number = found->second.number;
+  claims.erase(found);
+  return number;
 }
 
 void Switchboard::settle_claims(shm::PortInstance port,
@@ -76,11 +76,9 @@ void Switchboard::settle_claims(shm::PortInstance port,
   // Those of peers that are here count too: this end may not have heard of the link.
   std::set<shm::PortInstance> peers;
   for (const auto& [peer, claim] : claims_of(port)) peers.insert(peer);
-  for (const auto& [instance, input] : inputs_) {
-    if (is_output && input->claims.count(port) != 0) peers.insert(instance);
-  }
-  for (const auto& [instance, output] : outputs_) {
-    if (!is_output && output->claims.count(port) != 0) peers.insert(instance);
+  for (auto each = claimed_.lower_bound({port, 0}); each != claimed_.end() && each->first == port;
+       ++each) {
+    if (outputs_.contains(each->second) != is_output) peers.insert(each->second);
   }
   for (const shm::PortInstance peer : peers) {
     const auto output = outputs_.find(is_output ? port : peer);
@@ -88,15 +86,15 @@ void Switchboard::settle_claims(shm::PortInstance port,
     if (output != outputs_.end() && input != inputs_.end()) {
       if (!client_of(peer).is_returning) settle(*output->second, *input->second);
     } else if (!is_away(peer)) {
-      claims_of(port).erase(peer);
+      take_claim(port, peer);
       client_of(port).send(message_to(wire::MessageKind::kPeerGone, port, peer));
     }
   }
 }
 
 void Switchboard::settle(OutputPort& output, InputPort& input) {
-  const auto by_output = take(output.claims, input.instance);
-  const auto by_input = take(input.claims, output.instance);
+  const auto by_output = take_claim(output.instance, input.instance);
+  const auto by_input = take_claim(input.instance, output.instance);
   if (by_output && by_input && *by_output == *by_input && *by_output != 0) {
     links_[{output.instance, input.instance}] = {LinkKind::kConnected, *by_output, ""};
     return;
@@ -114,14 +112,14 @@ void Switchboard::settle(OutputPort& output, InputPort& input) {
 }
 
 void Switchboard::end_claims_on(shm::PortInstance port) {
-  for (const auto& [instance, output] : outputs_) {
-    if (!take(output->claims, port)) continue;
-    output->client->send(message_to(wire::MessageKind::kPeerGone, instance, port));
-  }
-  for (const auto& [instance, input] : inputs_) {
-    if (!take(input->claims, port)) continue;
-    input->client->send(message_to(wire::MessageKind::kPeerGone, instance, port));
-    input->bell->ring();  // it may have died between delivering and ringing
+  for (auto each = claimed_.lower_bound({port, 0}); each != claimed_.end() && each->first == port;
+       each = claimed_.lower_bound({port, 0})) {
+    const shm::PortInstance peer = each->second;
+    take_claim(peer, port);
+    client_of(peer).send(message_to(wire::MessageKind::kPeerGone, peer, port));
+    const auto input = inputs_.find(peer);
+    // It may have died between delivering and ringing.
+    if (input != inputs_.end()) input->second->bell->ring();
   }
 }
 
@@ -132,8 +130,7 @@ void Switchboard::forget_away(shm::PortInstance port) {
     source->away = 0;
     names_.let_go(*source);
     registry_.source(source->id).clear_owner();
-  }
-  if (InputName* name = names_.input_of(port)) {
+  } else if (InputName* name = names_.input_of(port)) {
     taps_.end(port, name->name);
     name->away = 0;
     names_.let_go(*name);
