@@ -1,5 +1,7 @@
-// Ports that are opened while there is no daemon, or one that does not answer.
+// Ports that are opened while there is no daemon, one that does not answer, or a component that
+// does not.
 #include <gtest/gtest.h>
+#include <sys/syscall.h>
 
 #include <atomic>
 #include <chrono>
@@ -8,14 +10,19 @@
 
 #include <arbiter/arbiter.hpp>
 
+#include "shm/bell.hpp"
 #include "tests/client/models.hpp"
 #include "tests/client/samples.hpp"
 #include "tests/service/impatient.hpp"
 #include "tests/support/await.hpp"
 #include "tests/support/daemon.hpp"
+#include "tests/support/raw_port.hpp"
+#include "tests/support/threads.hpp"
 
 namespace arbiter::test {
 namespace {
+
+using wire::MessageKind;
 
 TEST(Takeover, OpeningWaitsForADaemon) {
   Daemon daemon(single_model());
@@ -76,6 +83,50 @@ TEST(Takeover, OpeningWhileTheDaemonIsStoppedEndsInTime) {
   // What it opens too late is closed again.
   auto out = at_last([&] { return node.output_port<Number>("/other"); });
   await([&] { return daemon.source("/out")["open"] != true; });
+}
+
+void answer_sync(RawClient& client, const wire::Message& sync) {
+  auto synced = RawClient::message(MessageKind::kSynced);
+  synced.request = sync.request;
+  client.send(synced);
+}
+
+// The instance of an output port that is open then.
+shm::PortInstance open_in_step(RawClient& client, const std::string& name,
+                               const shm::FileDescriptor& segment) {
+  client.send(RawClient::message(MessageKind::kOpenOutput, name), {segment.get(), -1});
+  shm::PortInstance port = 0;
+  for (wire::Received received; client.receive(received);) {
+    if (received.message.kind == MessageKind::kOpened) port = received.message.port;
+    if (received.message.kind == MessageKind::kSync) answer_sync(client, received.message);
+    if (received.message.kind == MessageKind::kConnected) break;
+  }
+  return port;
+}
+
+TEST(Introductions, ShowASegmentOnceItsOwnPublisherHasMadeRoom) {
+  Daemon daemon(
+      "<behaviors><arbiter at='/in' conflict='first'><select from='/slow'/><select from='/fast'/>"
+      "</arbiter></behaviors>");
+  const auto segment = raw_output_segment();
+  const auto inbox = raw_input_segment();
+  const shm::Bell bell;
+  RawClient slow(daemon.instance()), receiver(daemon.instance()), fast(daemon.instance());
+  slow.hello("slow", wire::kHasServiceThread);
+  receiver.hello("receiver");
+  fast.hello("fast");
+  const auto slow_port = open_in_step(slow, "/slow", segment);
+  // Both at once, lest the daemon has waited for the slow one long enough.
+  wait_until_it_sleeps_in(SYS_epoll_wait, daemon.process().pid(), daemon.process().pid());
+  daemon.process().stop();
+  receiver.send(RawClient::message(MessageKind::kOpenInput, "/in"),
+                {inbox.get(), bell.write_end().get()});
+  fast.send(RawClient::message(MessageKind::kOpenOutput, "/fast"), {segment.get(), -1});
+  daemon.process().signal(SIGCONT);
+  const auto fast_port = fast.expect(MessageKind::kOpened).message.port;
+  EXPECT_EQ(receiver.expect(MessageKind::kOutputGrown).message.peer, fast_port);
+  answer_sync(slow, slow.expect(MessageKind::kSync).message);
+  EXPECT_EQ(receiver.expect(MessageKind::kOutputGrown).message.peer, slow_port);
 }
 
 }  // namespace
