@@ -51,6 +51,7 @@ void turn_away(shm::FileDescriptor socket, uid_t user) {
   if (errands.is_stuck(user)) {
     wire::hang_up(std::move(socket), user);
   } else {
+    ::shutdown(socket.get(), SHUT_RDWR);  // the thread that closes it may be lost
     errands.close(user, std::move(socket));
   }
 }

@@ -216,13 +216,11 @@ TEST_F(AUserWhoseThreadsAreLost, IsGivenUpBeforeItKeepsThoseOfOthers) {
   expect_that_others_are_served(daemon_);
 }
 
-// Who has all that he may have is turned away before anything is read from him. He may have 269
-// descriptors: with the last, he is let in far enough to be hung up on, not to wait for his
-// threads.
+// Who has all that he may have is turned away before anything is read from him.
 class AUserWithoutThreadsOrShare : public AUserWhoseThreadsAreLost {
  protected:
   AUserWithoutThreadsOrShare()
-      : AUserWhoseThreadsAreLost({.arguments = {"--user-share", "10"}, .max_descriptors = 3014}) {}
+      : AUserWhoseThreadsAreLost({.arguments = {"--user-share", "10"}, .max_descriptors = 3000}) {}
 
   void SetUp() override {
     if (!may_be_another_user()) GTEST_SKIP() << "only root can start processes of other users";
