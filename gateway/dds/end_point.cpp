@@ -98,6 +98,7 @@ void EndPoint::look_at(const PeersOfTopic& peers) {
   account_.set_peers(count);
   tell_obstacles(count);
   warn();
+  catch_up();
 }
 
 // Where the mapping does not say whether the type has a key, who is there says it: without this,

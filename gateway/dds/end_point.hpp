@@ -49,6 +49,8 @@ class EndPoint {
                                     const ddsi_sertype* type, const dds_qos_t* qos) = 0;
   // It is open, and in use by this call.
   virtual void begin() noexcept {}
+  // Now and then, while it is open.
+  virtual void catch_up() noexcept {}
   // What it asks for now; the mapping's, if it may have that.
   [[nodiscard]] virtual Durability durability() const { return entry_.dds->qos.durability; }
   // Why that is less than the mapping's: "T is not forever".

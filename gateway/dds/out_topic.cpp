@@ -21,6 +21,8 @@ LastSample keep_unsent(Bytes sample) noexcept {
   return LastSample(copy);
 }
 
+bool is_unsent(const Payload& payload) noexcept { return payload.cyclone.ops == nullptr; }
+
 }  // namespace
 
 OutTopic::OutTopic(const Entry& entry, Account& account, const Bell& bell)
@@ -35,11 +37,20 @@ bool OutTopic::latches() const {
 
 LastSample OutTopic::take_last() noexcept { return has_idle_sample_ ? nullptr : std::move(last_); }
 
-// A copy: the last one is of the end before.
+// A copy: the last one is of the end before, or was not made for one.
 void OutTopic::begin() noexcept {
   if (!last_) return;
   Payload* const again = make_payload(type_, {last_->bytes(), last_->size});
-  if (again != nullptr) static_cast<void>(write(*again));  // nobody is there yet for it to wait for
+  if (again != nullptr) static_cast<void>(write(*again));  // else catch_up()
+}
+
+void OutTopic::catch_up() noexcept {
+  const std::lock_guard lock(in_use());
+  if (is_open() && last_ && is_unsent(*last_)) begin();
+}
+
+void OutTopic::keep_untold(Bytes sample) noexcept {
+  if (latches()) last_ = has_idle_sample_ ? nullptr : keep_unsent(sample);
 }
 
 Entity OutTopic::make(dds_entity_t participant, dds_entity_t topic, const ddsi_sertype* type,
@@ -77,6 +88,10 @@ Sender::Result OutTopic::send(Bytes sample) noexcept {
   dds_wait_for_acks(end().get(), kMaxBlocking);
   result = send_at_once(sample);
   if (result != Result::kBusy) return result;
+  {
+    const std::lock_guard lock(in_use());
+    keep_untold(sample);
+  }
   return refuse("a subscriber does not keep up: a sample was not sent, the writer was full");
 }
 
@@ -136,7 +151,7 @@ std::optional<Sender::Result> OutTopic::obstacle(Bytes sample) noexcept {
     return Result::kUnreadable;
   }
   if (is_open()) return {};
-  if (latches() && !has_idle_sample_) last_ = keep_unsent(sample);
+  keep_untold(sample);
   return Result::kNotReady;
 }
 
@@ -153,6 +168,7 @@ Sender::Result OutTopic::write(Payload& payload) noexcept {
     return Result::kSent;
   }
   if (written == DDS_RETCODE_TIMEOUT) return Result::kBusy;
+  if (sent) keep_untold({sent->bytes(), sent->size});
   return refuse(std::string("Cyclone DDS did not send a sample: ") + dds_strretcode(-written));
 }
 

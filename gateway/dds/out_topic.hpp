@@ -28,7 +28,8 @@ class OutTopic : public EndPoint, public Sender {
   void tell_nobody() noexcept { outgoing_.withdraw(); }
 
   // Whether those who come later are given what was sent last. Each end that is opened later sends
-  // it again, unless the entry has an idle sample and something was to be sent meanwhile.
+  // it again, unless the entry has an idle sample and something was to be sent meanwhile. What was
+  // refused is sent again, too, once there is room.
   [[nodiscard]] bool latches() const;
   // Before it is opened.
   void begin_with(LastSample last) noexcept { last_ = std::move(last); }
@@ -49,10 +50,14 @@ class OutTopic : public EndPoint, public Sender {
   [[nodiscard]] bool is_served() const override { return outgoing_.get() != nullptr; }
   [[nodiscard]] std::uint32_t matched() const override;
   void begin() noexcept override;
+  void catch_up() noexcept override;
   // On Cyclone's threads.
   void on_matched(const dds_publication_matched_status_t& status) noexcept;
   // Why a sample cannot be written; empty: it can. With in_use(), as the next one.
   std::optional<Result> obstacle(Bytes sample) noexcept;
+  // Was not sent, but is what those are to be told who come later: not the one before. With
+  // in_use().
+  void keep_untold(Bytes sample) noexcept;
   // Takes over a reference.
   Result write(Payload& payload) noexcept;
   Result refuse(const std::string& why) noexcept;
@@ -61,7 +66,8 @@ class OutTopic : public EndPoint, public Sender {
   const Representation representation_;
   const ddsi_sertype* type_ = nullptr;
   const bool has_idle_sample_;
-  // That was sent, or was to be sent while this was closed, if the entry latches; with in_use().
+  // That was sent, or was to be sent while this was closed or had no room, if the entry latches;
+  // with in_use().
   LastSample last_;
   // Of whoever has the entry's turn, as is note() of the next one.
   Payload* draft_ = nullptr;

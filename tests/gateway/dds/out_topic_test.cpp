@@ -12,7 +12,9 @@
 #include "gateway/dds/opaque_type.hpp"
 #include "gateway/dds/reader_cache.hpp"
 #include "tests/gateway/dds/own_domain.hpp"
+#include "tests/gateway/dds/scene.hpp"
 #include "tests/gateway/mapping_text.hpp"
+#include "tests/support/await.hpp"
 
 namespace arbiter::gateway::dds {
 namespace {
@@ -58,6 +60,18 @@ class Latched : public ::testing::Test {
     topic_.emplace(entry(), *account_, bell_);
     topic_->begin_with(latched.take("name"));
     topic_->open(*domain_);
+  }
+  // In a process of its own; it is matched.
+  test::Stranger subscriber() {
+    test::Stranger result("cyclone", number_,
+                          {"sub", "blob", "rt/cmd", "name=a::msg::dds_::B_",
+                           "durability=transient_local", "depth=1"});
+    result.await("matched 1");
+    test::await([&] {
+      topic_->look_at({});
+      return account().may_have_peers();
+    });
+    return result;
   }
   // What a reader is given that comes now: within a process at once.
   std::vector<std::string> given() {
@@ -146,6 +160,24 @@ TEST_F(Latched, WhatIsNotLatchedIsNot) {
   open_again();
   EXPECT_FALSE(topic_->latches());
   EXPECT_FALSE(topic_->take_last());
+}
+
+// Cyclone lets half of this wait for an acknowledgement where nothing may be overwritten. Who comes
+// later must not be told that the robot may go once it is to stop.
+TEST_F(Latched, WhatTheWriterHadNoRoomForIsThereOnceItHas) {
+  make("qos='latched' history='keep_all'");
+  const std::string large = one_ + std::string(kMiB, '.');
+  test::Stranger slow = subscriber();
+  slow.process().stop();
+  EXPECT_EQ(send(large), Sender::Result::kSent);
+  EXPECT_EQ(send(two_), Sender::Result::kRefused);
+  topic_->look_at({});
+  EXPECT_TRUE(given().back() == large);
+  slow.process().resume();
+  test::await([&] {
+    topic_->look_at({});
+    return given().back() == two_;
+  });
 }
 
 // A base that comes then must not drive off by a command of before.
