@@ -3,6 +3,7 @@
 #pragma once
 
 #include <functional>
+#include <ostream>
 #include <utility>
 #include <vector>
 
@@ -18,6 +19,9 @@ struct Case {
   // Makes what the scenario needs, and calls the function once, with the scenario.
   std::function<void(const Explore&)> body;
 };
+
+// What GoogleTest lists it by.
+inline void PrintTo(const Case& each, std::ostream* to) { *to << each.name; }
 
 inline std::vector<Case>& cases() {
   static std::vector<Case> all;
