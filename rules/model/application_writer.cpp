@@ -32,7 +32,8 @@ std::string lower_case(std::string text) {
 
 // Whether text can be put in as UTF-8. The declaration, if there is one, comes first.
 bool is_utf8(std::string_view content) {
-  const std::string_view start = content.substr(0, content.find("?>"));
+  const bool has_declaration = content.starts_with("<?xml");
+  const std::string_view start = content.substr(0, has_declaration ? content.find("?>") : 0);
   if (const std::size_t at = start.find("encoding"); at != std::string_view::npos) {
     const std::string declared = lower_case(std::string(start.substr(at, 20)));
     if (declared.find("utf-8") == std::string::npos) return false;

@@ -49,9 +49,10 @@ inline ExpressionPtr make_quantifier(Operator op, std::string glob) {
   return std::make_shared<Expression>(Expression{op, std::move(glob), {}});
 }
 
-// Expressions share much: what was seen already is not looked at again.
-inline void add_sources_of(const Expression& expression, std::set<std::string>& sources,
-                           std::set<const Expression*>& seen) {
+// Expressions share much: what was seen already is not looked at again. `sources` are a set of
+// names, or of views of those in the expression; `seen` of pointers to expressions.
+template <typename Sources, typename Seen>
+void add_sources_of(const Expression& expression, Sources& sources, Seen& seen) {
   if (!seen.insert(&expression).second) return;
   if (expression.op == Operator::kSource) sources.insert(expression.name);
   for (const ExpressionPtr& operand : expression.operands) add_sources_of(*operand, sources, seen);

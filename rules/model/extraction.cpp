@@ -10,6 +10,7 @@
 
 #include "rules/model/quantifiers.hpp"
 #include "rules/text/names.hpp"
+#include "shm/limits.hpp"
 
 namespace arbiter::rules {
 namespace {
@@ -68,11 +69,17 @@ class Extraction {
   };
 
   void expand_conditions() {
-    QuantifierExpansion expansion(rules_.sources);
+    // A model with too many sources is refused: no quantifier of it is worth going through them.
+    static const std::vector<std::string> kNoSources;
+    const bool is_refused = rules_.sources.size() > shm::kMaxSources;
+    gives_advice_ = gives_advice_ && !is_refused;
+    QuantifierExpansion expansion(is_refused ? kNoSources : rules_.sources);
     for (const Behaviour& behaviour : model_.behaviours) {
       auto& expanded = conditions_.emplace_back();
+      std::size_t& terms = condition_terms_.emplace_back();
       for (const Condition& condition : behaviour.conditions) {
         expanded.push_back(expansion.expand(condition.expression));
+        terms += terms_of(expanded.back());
         warn_of_unmatched(expansion, condition.where);
       }
     }
@@ -80,6 +87,19 @@ class Extraction {
       select_conditions_.push_back(expansion.expand(select.condition));
       warn_of_unmatched(expansion, select.where);
     }
+  }
+
+  // What it shares counts at each place, for whoever looks at a rule goes through all of it.
+  std::size_t terms_of(const ExpressionPtr& expression) {
+    const bool is_shared = expression.use_count() > 1;
+    if (is_shared) {
+      const auto known = terms_of_shared_.find(expression.get());
+      if (known != terms_of_shared_.end()) return known->second;
+    }
+    std::size_t terms = 1;
+    for (const ExpressionPtr& operand : expression->operands) terms += terms_of(operand);
+    if (is_shared) terms_of_shared_.emplace(expression.get(), terms);
+    return terms;
   }
 
   void warn_of_unmatched(QuantifierExpansion& expansion, const Location& where) {
@@ -131,12 +151,16 @@ class Extraction {
     std::vector<ExpressionPtr> terms;
     for (std::size_t b = behaviour; b != Hierarchy::kNobody; b = hierarchy_.parent(b)) {
       terms.insert(terms.end(), conditions_[b].begin(), conditions_[b].end());
-      if (!take_account_of(conditions_[b].size() + 1, behaviour)) return nullptr;
+      if (!take_account_of(condition_terms_[b] + 1, model_.behaviours[behaviour].where)) {
+        return nullptr;
+      }
     }
     for (std::size_t b = behaviour; b != Hierarchy::kNobody; b = hierarchy_.parent(b)) {
       for (const Hierarchy::Inhibitor& inhibitor : hierarchy_.inhibitors(b)) {
         const auto& sources = find_inhibiting_sources(inhibitor, b, port);
-        if (!take_account_of(sources.size() + 1, behaviour)) return nullptr;
+        if (!take_account_of(sources.size() + 1, model_.behaviours[behaviour].where)) {
+          return nullptr;
+        }
         for (const SourceIndex source : sources) {
           if (std::exchange(last_rule_with_[source], rule_count_) == rule_count_) continue;
           terms.push_back(inactive_[source]);
@@ -147,14 +171,16 @@ class Extraction {
     return terms.size() == 1 ? terms.front() : make_operation(Operator::kAnd, std::move(terms));
   }
 
-  bool take_account_of(std::size_t terms, std::size_t behaviour) {
+  // It is about no behaviour, but about all rules: those from here on are missing.
+  bool take_account_of(std::size_t terms, const Location& where) {
     term_count_ += terms;
     if (term_count_ <= kMaxRuleTerms) return true;
     if (std::exchange(is_exhausted_, true)) return false;
-    diagnostics_.error("limit-exceeded", model_.behaviours[behaviour].where,
+    gives_advice_ = false;
+    diagnostics_.error("limit-exceeded", where,
                        "from here on, the rules of the model have more terms than the limit of " +
-                           std::to_string(kMaxRuleTerms) + " in all; use fewer inhibitions",
-                       {.behaviour = model_.behaviours[behaviour].name});
+                           std::to_string(kMaxRuleTerms) +
+                           " in all; use fewer inhibitions, or shorter conditions");
     return false;
   }
 
@@ -224,6 +250,7 @@ class Extraction {
 
   void extract_select(const Select& select) {
     const auto index = static_cast<std::size_t>(&select - model_.selects.data());
+    if (!take_account_of(terms_of(select_conditions_[index]), select.where)) return;
     const auto [found, is_new] = find_entry(select.source, select.port);
     if (is_new) {
       add(select.order, select.port, {select.source, select_conditions_[index], select.where, {}});
@@ -297,14 +324,16 @@ class Extraction {
   const Model& model_;
   const Hierarchy& hierarchy_;
   Diagnostics& diagnostics_;
-  const bool gives_advice_;
+  bool gives_advice_;
   RuleSet rules_;
 
   std::unordered_map<std::string, SourceIndex> source_indices_;
   std::unordered_map<std::string, PortIndex> port_indices_;
   std::vector<const std::string*> port_names_;
   std::vector<std::vector<ExpressionPtr>> conditions_;  // by behaviour, quantifiers expanded
+  std::vector<std::size_t> condition_terms_;            // by behaviour, of all of these
   std::vector<ExpressionPtr> select_conditions_;
+  std::unordered_map<const Expression*, std::size_t> terms_of_shared_;
   std::vector<ExpressionPtr> inactive_;  // by source, shared by all rules
   const ExpressionPtr always_ = make_constant(true);
   std::vector<std::optional<Voice>> voices_;  // by behaviour, made when needed

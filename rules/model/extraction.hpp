@@ -10,7 +10,8 @@
 
 namespace arbiter::rules {
 
-// Of all rules together, counted before what is the same is joined: what a model may ask of us.
+// Of all rules together, counted before what is the same is joined: what a model may ask of us. A
+// condition has one for each name and operator in it, and counts in each rule that it is part of.
 inline constexpr std::size_t kMaxRuleTerms = 16u << 20;
 
 // Sources, timeouts, ports with their rules, behaviours; other_connections stay empty. Notes and

@@ -18,16 +18,6 @@
 namespace arbiter::rules {
 namespace {
 
-// The names of all sources in a rule. Rules share much, hence what was seen is not seen again.
-void collect_reads(const ExpressionPtr& expression, std::unordered_set<const Expression*>& seen,
-                   std::unordered_set<std::string_view>& sources) {
-  if (!seen.insert(expression.get()).second) return;
-  if (expression->op == Operator::kSource) sources.insert(expression->name);
-  for (const ExpressionPtr& operand : expression->operands) {
-    collect_reads(operand, seen, sources);
-  }
-}
-
 class LimitCheck {
  public:
   LimitCheck(const RuleSet& rules, const Application* application, const DocumentOrder& order,
@@ -90,7 +80,7 @@ class LimitCheck {
       where = &rules->where;
       std::unordered_set<const Expression*> seen;
       for (const ConnectionRule& rule : rules->rules) {
-        collect_reads(rule.condition, seen, sources);
+        add_sources_of(*rule.condition, sources, seen);
       }
     }
     report(sources.size(), shm::kMaxSourcesPerPort,
@@ -127,7 +117,7 @@ std::map<std::string_view, const Location*> places_of_reads(const Model& model) 
   std::unordered_set<const Expression*> seen;
   const auto add = [&](const ExpressionPtr& condition, const Location& where) {
     std::unordered_set<std::string_view> reads;
-    collect_reads(condition, seen, reads);
+    add_sources_of(*condition, reads, seen);
     for (const std::string_view source : reads) places.emplace(source, &where);
   };
   for (const Behaviour& behaviour : model.behaviours) {
@@ -158,7 +148,7 @@ class UnpublishedSources {
     for (const PortRules& port : rules.ports) {
       for (const ConnectionRule& rule : port.rules) {
         std::unordered_set<std::string_view> reads;
-        collect_reads(rule.condition, seen, reads);
+        add_sources_of(*rule.condition, reads, seen);
         for (const std::string_view source : std::set(reads.begin(), reads.end())) {
           if (!known.insert(source).second || published_.contains(source) || has_module(source)) {
             continue;

@@ -8,8 +8,8 @@
 #pragma once
 
 #include <bitset>
+#include <cstddef>
 #include <cstdint>
-#include <unordered_set>
 #include <utility>
 #include <vector>
 
@@ -50,9 +50,36 @@ bool exclude_each_other(const Literals& a, const Literals& b);
 // Whether the function holds under each activation in which `given` holds.
 bool holds_given(const DiagramNodes& function, const Literals& given);
 
+// Pairs of nodes. When there are too many, all of them are forgotten: whoever goes by them takes
+// more steps then, which a budget bounds, and not more memory, which nothing else would.
+class NodePairSet {
+ public:
+  // 256 MiB, and half as much again while it grows.
+  static constexpr std::size_t kMaxSlots = std::size_t{1} << 25;
+
+  explicit NodePairSet(std::size_t max_slots) : max_slots_(max_slots) { clear(); }
+
+  void clear();
+  [[nodiscard]] bool contains(std::uint64_t pair) const { return slots_[place_of(pair)] == pair; }
+  void insert(std::uint64_t pair);
+
+ private:
+  static constexpr std::uint64_t kFree = ~std::uint64_t{0};
+  static constexpr std::size_t kFirstSlots = 256;  // a power of two, as the most are
+
+  // Of the pair, or of the free slot for it.
+  [[nodiscard]] std::size_t place_of(std::uint64_t pair) const;
+
+  const std::size_t max_slots_;
+  std::vector<std::uint64_t> slots_;  // at most three quarters full
+  std::size_t used_ = 0;
+};
+
 class Proof {
  public:
-  explicit Proof(Budget& budget) : budget_(budget) {}
+  // `max_slots`: a power of two; fewer are for tests.
+  explicit Proof(Budget& budget, std::size_t max_slots = NodePairSet::kMaxSlots)
+      : budget_(budget), apart_(max_slots) {}
 
   using Pair = std::pair<std::size_t, std::size_t>;  // indices, the lower one first
 
@@ -70,8 +97,8 @@ class Proof {
   bool walk(const DiagramNodes& a, shm::Word at_a, const DiagramNodes& b, shm::Word at_b);
 
   Budget& budget_;
-  std::unordered_set<std::uint64_t> apart_;  // pairs of nodes known to exclude each other
-  Literals path_;                            // to where the last walk found that both hold
+  NodePairSet apart_;  // known to exclude each other
+  Literals path_;      // to where the last walk found that both hold
 };
 
 }  // namespace arbiter::rules

@@ -77,12 +77,13 @@ Diagram RuleBuilder::rule(const ConnectionRule& rule) {
 }
 
 // Of the sources that the expression names; behind all levels if it names none.
-int RuleBuilder::first_level(const Expression& expression) const {
+int RuleBuilder::first_level(const Expression& expression) {
+  if (expression.op == Operator::kSource) return builder_.level_of(variable(expression.name));
+  const auto known = first_levels_.find(&expression);
+  if (known != first_levels_.end()) return known->second;
   int first = std::numeric_limits<int>::max();
-  std::unordered_set<const Expression*> seen;
-  visit_sources(expression, seen, [&](const std::string& source) {
-    first = std::min(first, builder_.level_of(variable(source)));
-  });
+  for (const auto& operand : expression.operands) first = std::min(first, first_level(*operand));
+  first_levels_.emplace(&expression, first);
   return first;
 }
 

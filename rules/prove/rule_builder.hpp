@@ -34,10 +34,13 @@ class RuleBuilder {
 
   // The own source active, and the condition.
   Diagram rule(const ConnectionRule& rule);
-  void forget_parts() { built_.clear(); }
+  void forget_parts() {
+    built_.clear();
+    first_levels_.clear();
+  }
 
  private:
-  [[nodiscard]] int first_level(const Expression& expression) const;
+  int first_level(const Expression& expression);
   Diagram build(const ExpressionPtr& expression);
   Diagram build_new(const Expression& expression);
   Diagram join(Operator op, const std::vector<const ExpressionPtr*>& operands);
@@ -48,6 +51,8 @@ class RuleBuilder {
   std::vector<std::string> names_;
   std::unordered_map<std::string, int> variables_;
   std::unordered_map<const Expression*, Diagram> built_;  // shared ones are built once
+  // Of what is no source. Sifting may make them out of date, which costs steps and nothing else.
+  std::unordered_map<const Expression*, int> first_levels_;
 };
 
 // The kind, reads and nodes of a rule whose function is given, its own source taken as active.

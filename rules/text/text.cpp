@@ -1,5 +1,7 @@
 #include "rules/text/text.hpp"
 
+#include <algorithm>
+
 #include "rules/text/names.hpp"
 
 namespace arbiter::rules {
@@ -42,19 +44,16 @@ Location Text::where() const {
 
 std::string Text::origin(std::size_t i) const {
   if (i == bytes_.size() && i > 0) --i;
-  for (const Expansion& expansion : expansions_) {
-    if (i >= expansion.first && i < expansion.last) {
-      return " (in the text of ${" + expansion.define + "})";
-    }
-  }
-  return {};
+  const std::string define = define_of(i, i + 1);
+  return define.empty() ? define : " (in the text of ${" + define + "})";
 }
 
 std::string Text::define_of(std::size_t first, std::size_t last) const {
-  for (const Expansion& expansion : expansions_) {
-    if (first >= expansion.first && last <= expansion.last) return expansion.define;
-  }
-  return {};
+  const auto at =
+      std::partition_point(expansions_.begin(), expansions_.end(),
+                           [first](const Expansion& expansion) { return expansion.last <= first; });
+  return at != expansions_.end() && at->first <= first && last <= at->last ? at->define
+                                                                           : std::string();
 }
 
 }  // namespace arbiter::rules

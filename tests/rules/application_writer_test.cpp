@@ -91,6 +91,9 @@ TEST(ApplicationWriter, KeepsToTheEncodingOfTheFile) {
   const std::string utf8 =
       merge(model, "<?xml version='1.0' encoding='utf-8'?><application></application>");
   EXPECT_THAT(utf8, HasSubstr("<arbiter at=\"/größe\">"));
+  const std::string undeclared =
+      merge(model, "<application><parameters>--encoding jpeg</parameters></application>");
+  EXPECT_THAT(undeclared, HasSubstr("<arbiter at=\"/größe\">"));
 }
 
 // Only the model in it must be UTF-8: a name in Latin-1 elsewhere is not ours to judge.

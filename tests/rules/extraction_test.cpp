@@ -229,5 +229,54 @@ TEST(Extraction, OfAModelThatWouldExplodeEndsAtALimit) {
   EXPECT_THAT(loaded.message(), HasSubstr("more terms than the limit of 16777216"));
 }
 
+// A small file of shared conditions would otherwise be gone through for hours.
+TEST(Extraction, AConditionCountsInEachRuleThatItIsPartOf) {
+  std::string wide = "/a";
+  for (int i = 0; i < 1'000; ++i) wide += " | not /a" + std::to_string(i % 100);
+  std::string model = "<define name='wide'>" + wide + "</define>";
+  std::vector<std::string> inside;
+  for (int i = 0; i < 100; ++i) {
+    const std::string number = std::to_string(i);
+    inside.push_back("B" + number);
+    model += behaviour(inside.back(), config("/s" + number, "/p" + number));
+  }
+  for (int i = 0; i < 100; ++i) {
+    model += meta("M" + std::to_string(i), inside, condition("${wide} | /x" + std::to_string(i)));
+    inside = {"M" + std::to_string(i)};
+  }
+  const Loaded loaded = load_text(model);
+  ASSERT_EQ(loaded.items.size(), 1u);
+  EXPECT_EQ(loaded.items[0].code, "limit-exceeded");
+  EXPECT_THAT(loaded.message(), HasSubstr("more terms than the limit of 16777216"));
+  for (const PortRules& port : loaded.rules.ports) EXPECT_TRUE(port.is_doubtful) << port.port;
+}
+
+TEST(Extraction, WhatAQuantifierStandsForCountsToo) {
+  std::string all, selects;
+  for (int i = 0; i < 250; ++i) all += "<source port='/s" + std::to_string(i) + "'/>";
+  const std::string many = [] {
+    std::string text = "any(/s*)";
+    for (int i = 0; i < 3'000; ++i) text += "|any(/s*)";
+    return text;
+  }();
+  for (int i = 0; i < 30; ++i) {
+    selects += "<arbiter at='/p" + std::to_string(i) + "'><select from='/s0'>" + many +
+               "</select></arbiter>";
+  }
+  const Loaded loaded = load_text(all + selects);
+  ASSERT_EQ(loaded.items.size(), 1u);
+  EXPECT_EQ(loaded.items[0].code, "limit-exceeded");
+}
+
+// To look for the sources of each pattern would take long, and the model is refused in any case.
+TEST(Extraction, WithTooManySourcesNoQuantifierIsLookedAt) {
+  std::string model;
+  for (int i = 0; i < 9'000; ++i) model += "<source port='/s" + std::to_string(i) + "'/>";
+  model += behaviour("A", config("/s0", "/p") + condition("any(/nothing/*)"));
+  const Loaded loaded = load_text(model);
+  ASSERT_EQ(loaded.items.size(), 1u);
+  EXPECT_THAT(loaded.message(), HasSubstr("9000 sources, more than the limit of 8192"));
+}
+
 }  // namespace
 }  // namespace arbiter::rules

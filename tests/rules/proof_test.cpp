@@ -229,6 +229,45 @@ TEST(Proof, InhibitionsThatWouldExplodeAsOneDiagramAreProvedByPairs) {
   EXPECT_EQ(model.ports.size(), 1u);
 }
 
+// Sums of bits, of which no order of the variables makes the diagrams small. Those of `b` say of
+// one sum the opposite of what those of `a` come to, or leave it open.
+struct Sums {
+  rules::DiagramNodes a, b;
+};
+Sums sums_that_exclude_each_other(bool really) {
+  constexpr int kVariables = 24, kSums = 4;
+  rules::DiagramBuilder builder;
+  std::mt19937 random(24);
+  rules::Diagram a = builder.constant(true), b = a, total = builder.constant(false);
+  const auto add = [&](rules::Diagram& function) {
+    rules::Diagram sum = builder.constant(false);
+    for (int i = 0; i < kVariables; ++i) {
+      if (random() % 2 == 0)
+        sum = builder.combine(rules::Connective::kXor, sum, builder.variable(i));
+    }
+    function = builder.combine(rules::Connective::kAnd, function, sum);
+    total = builder.combine(rules::Connective::kXor, total, sum);
+  };
+  for (int i = 0; i < kSums; ++i) add(a);
+  for (int i = 0; i < kSums; ++i) add(b);
+  // With these 2 * kSums all true, their sum is false.
+  if (really) b = builder.combine(rules::Connective::kAnd, b, total);
+  return {builder.nodes(a), builder.nodes(b)};
+}
+
+TEST(Proof, ForgetsPairsRatherThanRememberMoreOfThemThanItMay) {
+  for (const bool really : {true, false}) {
+    const Sums sums = sums_that_exclude_each_other(really);
+    rules::Budget of_all, of_few;
+    rules::Proof all(of_all), few(of_few, 256);
+    const auto meet = all.pairs_that_meet({sums.a, sums.b});
+    EXPECT_EQ(meet.empty(), really);
+    EXPECT_EQ(few.pairs_that_meet({sums.a, sums.b}), meet);
+    if (really)
+      EXPECT_GT(of_few.spent(), of_all.spent()) << "what was forgotten is looked at again";
+  }
+}
+
 TEST(Witness, AShortestImplicantOfEachFunctionOfThreeVariablesIsOneByBruteForce) {
   rules::DiagramBuilder builder;
   for (unsigned truth_table = 1; truth_table < 256; ++truth_table) {
