@@ -23,7 +23,7 @@ constexpr std::size_t kMaxSensed = 6;
 
 // "/Gaze/pos:i" and "/Gaze" belong to "Gaze": components put their name in front of their ports'.
 std::string component_of(std::string_view port) {
-  if (port.starts_with('/')) port.remove_prefix(1);
+  if (port.size() > 1 && port.starts_with('/')) port.remove_prefix(1);  // "/" is a name, too
   const std::size_t slash = port.find('/');
   if (slash != std::string_view::npos && slash > 0) return std::string(port.substr(0, slash));
   const std::size_t colon = port.rfind(':');

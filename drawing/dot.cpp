@@ -13,8 +13,10 @@ void for_each_character(std::string_view text, const Use& use) {
     const shm::Utf8Character character = shm::decode_utf8(text.substr(i));
     const std::size_t length = character.length == 0 ? 1 : character.length;
     const bool is_line_end = text[i] == '\n';
+    // Graphviz's reader of labels takes neither control characters nor these two.
+    const bool is_none = character.code == 0xfffe || character.code == 0xffff;
     const bool can_be_drawn =
-        character.length != 0 && (is_line_end || !shm::is_control(character.code));
+        character.length != 0 && !is_none && (is_line_end || !shm::is_control(character.code));
     use(can_be_drawn ? text.substr(i, length) : std::string_view("\xef\xbf\xbd"));
     i += length;
   }

@@ -26,6 +26,7 @@ TEST(Dot, WhatCannotBeDrawnIsMadeVisible) {
             "/gr\xef\xbf\xbd\xef\xbf\xbd"
             "er\xef\xbf\xbd");
   EXPECT_EQ(quoted("\x80"), "\"\xef\xbf\xbd\"");
+  EXPECT_EQ(html("/\xef\xbf\xbe\xef\xbf\xbf"), "/\xef\xbf\xbd\xef\xbf\xbd");
 }
 
 TEST(Dot, StatementsAreIndentedAndEmptyAttributesLeftOut) {

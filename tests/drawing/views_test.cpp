@@ -86,6 +86,14 @@ TEST(ConnectionsView, PutsThePortsOfAComponentTogether) {
   EXPECT_THAT(dot, HasSubstr("c0:o1:e -> c0:i0r0:w"));
 }
 
+// Graphviz takes no empty title.
+TEST(ConnectionsView, APortThatIsCalledOnlyASlashHasAComponentOfThatName) {
+  const std::string dot = draw(load(R"(<behaviors>
+      <behavior name="A"><config at="/">/s:o</config></behavior></behaviors>)"),
+                               View::kConnections);
+  EXPECT_THAT(dot, HasSubstr("<B>/</B>"));
+}
+
 // By inhibition across ports, each behaviour of a large model may matter to each port.
 TEST(ConnectionsView, SourcesThatAreOnlySensedShareARowWhereTheyAreMany) {
   std::string rules, condition = "not /Sensor0:o";
