@@ -29,10 +29,16 @@ class ApplicationReader {
     const auto document = parse_xml(file_, diagnostics_);
     if (!document) return false;
     const Elements top(document->first());
-    if (top.begin() == top.end()) {
+    if (is_blank(document->first())) {
       diagnostics_.error("empty-file", file_.locate(0),
                          "the file is empty; an application without connections is "
                          "<application/>");
+      return false;
+    }
+    if (top.begin() == top.end()) {
+      diagnostics_.error("not-an-application", file_.locate(0),
+                         "the file has no element; the root of an application file is "
+                         "<application>");
       return false;
     }
     const XmlNode& root = *top.begin();

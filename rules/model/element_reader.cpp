@@ -163,4 +163,11 @@ std::optional<Mention> ElementReader::name(const Text& text, std::string_view wh
   return Mention{std::move(name), text.where()};
 }
 
+bool is_blank(const XmlNode* first) {
+  for (const XmlNode* node = first; node != nullptr; node = node->next) {
+    if (!trim(node->text).empty()) return false;
+  }
+  return true;
+}
+
 }  // namespace arbiter::rules

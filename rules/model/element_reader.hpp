@@ -62,6 +62,9 @@ class ElementReader {
   Diagnostics& diagnostics_;
 };
 
+// Whether there is nothing but blanks among siblings, and no element.
+[[nodiscard]] bool is_blank(const XmlNode* first);
+
 // The elements among siblings: for (const XmlNode& child : Elements(element.first_child)).
 class Elements {
  public:

@@ -14,13 +14,6 @@
 namespace arbiter::rules {
 namespace {
 
-bool is_blank_text(const XmlNode* first) {
-  for (const XmlNode* node = first; node != nullptr; node = node->next) {
-    if (!trim(node->text).empty()) return false;
-  }
-  return true;
-}
-
 constexpr std::string_view kApplication = "application";
 constexpr std::string_view kArbitration = "arbitration";
 
@@ -44,7 +37,7 @@ class ModelReader {
  private:
   bool read_tree(const XmlDocument& document) {
     const Elements top(document.first());
-    if (top.begin() == top.end() && is_blank_text(document.first())) {
+    if (is_blank(document.first())) {
       diagnostics_.error("empty-file", file_.locate(0),
                          "the file is empty; a model without rules is <behaviors/>");
       return give_up();

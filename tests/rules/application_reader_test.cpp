@@ -115,6 +115,7 @@ TEST(Application, MistakesAreReportedAtTheirPlace) {
   const std::vector<Case> cases{
       {"", "app.xml:1:1 error empty-file", "is <application/>"},
       {" <!-- c --> ", "app.xml:1:1 error empty-file", "is <application/>"},
+      {"t_ns,source", "app.xml:1:1 error not-an-application", "the file has no element"},
       {"<behaviors/>", "app.xml:1:1 error not-an-application",
        "is <application>, not <behaviors>; give a model as a model"},
       {"<application>\n<name>\n</application>", "app.xml:3:1 error malformed-xml",
