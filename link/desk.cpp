@@ -218,16 +218,18 @@ void Desk::compare_with_others(shm::Nanoseconds now) {
     standing_.swap(standing);
   }
   for (const Disagreement& each : news) {
-    say_sparingly(each.is_error() ? gateway::Level::kError : gateway::Level::kWarning, each.text());
+    const auto level = each.is_error() ? gateway::Level::kError : gateway::Level::kWarning;
+    if (say_sooner_or_later(level, each.text())) continue;
+    disagreements_.take_back(each);
+    compare_until_ = now + kComparing;
   }
 }
 
 // When it begins, and not for each card: strangers may send many.
 void Desk::say_without_place(std::size_t count) {
-  if (count != 0 && !is_without_place_said_) {
-    say_sparingly(gateway::Level::kWarning, wire::without_place_text(count));
-  }
-  is_without_place_said_ = count != 0;
+  is_without_place_said_ = count != 0 && (is_without_place_said_ ||
+                                          say_sooner_or_later(gateway::Level::kWarning,
+                                                              wire::without_place_text(count)));
 }
 
 // What there is no room for is said later.
@@ -235,11 +237,11 @@ void Desk::say_deaf(const std::set<std::string>& hosts) {
   std::erase_if(deaf_said_, [&](const std::string& host) { return !hosts.contains(host); });
   for (const std::string& host : hosts) {
     if (deaf_said_.contains(host)) continue;
-    const bool is_said =
-        say_sparingly(gateway::Level::kWarning,
-                      "host " + host +
-                          " is there, and has not heard this one for 2 s: nothing is imported from "
-                          "it until it does");
+    const bool is_said = say_sooner_or_later(
+        gateway::Level::kWarning,
+        "host " + host +
+            " is there, and has not heard this one for 2 s: nothing is imported from "
+            "it until it does");
     if (is_said) deaf_said_.insert(host);
   }
 }

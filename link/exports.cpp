@@ -187,7 +187,7 @@ void Exports::open_tap(Export& one, std::uint64_t id, const HostView& view) {
     if (one.said == error.what()) return;
     const std::string text =
         one.card.source + " cannot be sent to the hosts that want it: " + error.what();
-    if (say_sparingly(Level::kWarning, text)) one.said = error.what();
+    if (say_sooner_or_later(Level::kWarning, text)) one.said = error.what();
   }
 }
 

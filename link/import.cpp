@@ -161,9 +161,10 @@ void Import::say_shared_name() {
   if (name == shared_name_said_) return;
   const bool is_said =
       name.empty() ||
-      say_sparingly(Level::kWarning,
-                    source_ + " is open on several machines that are all called " + name +
-                        ", and is taken from the one that came last: give each its own --host");
+      say_sooner_or_later(
+          Level::kWarning,
+          source_ + " is open on several machines that are all called " + name +
+              ", and is taken from the one that came last: give each its own --host");
   if (is_said) shared_name_said_ = name;
 }
 
@@ -173,9 +174,9 @@ void Import::say_who_speaks() {
   if (text == hosts_said_) return;
   const bool is_said =
       text.empty() ||
-      say_sparingly(Level::kWarning, source_ + " is open on several hosts: " + text +
-                                         "; it is taken from " + offers_.speaker()->card.host +
-                                         " until that one is gone");
+      say_sooner_or_later(Level::kWarning,
+                          source_ + " is open on several hosts: " + text + "; it is taken from " +
+                              offers_.speaker()->card.host + " until that one is gone");
   if (is_said) hosts_said_ = text;
 }
 
@@ -225,7 +226,7 @@ void Import::begin_again() {
 }
 
 void Import::say_once(const std::string& text) {
-  if (text != said_ && say_sparingly(Level::kWarning, text)) said_ = text;
+  if (text != said_ && say_sooner_or_later(Level::kWarning, text)) said_ = text;
 }
 
 std::string Import::text() const {

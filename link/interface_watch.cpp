@@ -68,6 +68,15 @@ std::uint32_t local_address(const ifaddrmsg* message, std::size_t size) {
 InterfaceWatch::InterfaceWatch(std::vector<std::string> interfaces)
     : interfaces_(std::move(interfaces)), netlink_(open_netlink()) {}
 
+std::vector<std::string> InterfaceWatch::there() const {
+  std::vector<std::string> all;
+  for (const std::string& each : interfaces_) {
+    const auto place = places_.find(each);
+    if (place != places_.end() && place->second.address != 0) all.push_back(each);
+  }
+  return all;
+}
+
 std::string InterfaceWatch::missing() const {
   const auto lost = std::find_if(places_.begin(), places_.end(),
                                  [](const auto& each) { return each.second.index == 0; });
@@ -83,33 +92,39 @@ std::string InterfaceWatch::missing() const {
 }
 
 void InterfaceWatch::begin() {
-  bool was_gone = false;
   // What is left over is heard as a change: the link joins once more than it would have to.
-  static_cast<void>(hear(was_gone));
-  places_ = look();
+  static_cast<void>(hear(was_gone_));
+  was_gone_ = false;
+  const auto now = look();
+  has_news_ = !now;
+  places_ = now.value_or(Places());
 }
 
 std::string InterfaceWatch::change() {
-  bool was_gone = false;
-  if (!hear(was_gone)) return {};
-  const Places now = look();
-  for (const auto& [name, place] : now) {
+  has_news_ = hear(was_gone_) || has_news_;
+  if (!has_news_) return {};
+  const auto now = look();
+  if (!now) return {};  // the next time
+  has_news_ = false;
+  const bool was_gone = std::exchange(was_gone_, false);
+  for (const auto& [name, place] : *now) {
     const Place& before = places_[name];
     if (place == before) continue;
     if (place.index == 0) return "the network interface " + name + " has gone";
     if (place.address == 0) return "the network interface " + name + " has no address any more";
-    if (place.index != before.index) return "the network interface " + name + " is another one";
+    const bool is_other = before.address != 0 && place.index != before.index;
+    if (is_other) return "the network interface " + name + " is another one";
     return "the network interface " + name + " has the address " + address_text(place.address) +
            " now";
   }
   return was_gone ? "a network interface was gone" : "";
 }
 
-InterfaceWatch::Places InterfaceWatch::look() const {
+std::optional<InterfaceWatch::Places> InterfaceWatch::look() const {
   Places places;
   for (const std::string& each : interfaces_) places[each].index = ::if_nametoindex(each.c_str());
   ifaddrs* list = nullptr;
-  if (::getifaddrs(&list) != 0) return places_;  // no memory: at the next change
+  if (::getifaddrs(&list) != 0) return std::nullopt;
   const std::unique_ptr<ifaddrs, void (*)(ifaddrs*)> owned(list, ::freeifaddrs);
   for (const ifaddrs* each = list; each != nullptr; each = each->ifa_next) {
     if (each->ifa_addr == nullptr || each->ifa_addr->sa_family != AF_INET) continue;

@@ -10,6 +10,7 @@
 
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -25,6 +26,8 @@ class InterfaceWatch {
   // They are what they are now. Call it before joining: nothing that happens from then on is
   // missed.
   void begin();
+  // Those of them that were there then, and had an address.
+  [[nodiscard]] std::vector<std::string> there() const;
   // Which of them was not there then, and which there are instead, as a sentence; empty: all were.
   [[nodiscard]] std::string missing() const;
   // What has changed since, as a sentence for people; empty: nothing that matters. Does not wait.
@@ -36,13 +39,15 @@ class InterfaceWatch {
   struct Place {
     unsigned index = 0;
     std::uint32_t address = 0;
+    // To DDS, for which one without an address is none.
     friend bool operator==(const Place& one, const Place& other) noexcept {
-      return one.index == other.index && one.address == other.address;
+      return one.address == other.address && (one.index == other.index || one.address == 0);
     }
   };
   using Places = std::map<std::string, Place>;
 
-  [[nodiscard]] Places look() const;
+  // Nothing: memory is short, or no descriptor is left.
+  [[nodiscard]] std::optional<Places> look() const;
   // What netlink has said. True: something may have changed; `was_gone`: one of ours was.
   [[nodiscard]] bool hear(bool& was_gone);
   [[nodiscard]] bool is_loss_of_ours(const void* message) const;
@@ -50,6 +55,8 @@ class InterfaceWatch {
   const std::vector<std::string> interfaces_;
   shm::FileDescriptor netlink_;
   Places places_;
+  bool has_news_ = false;  // that nobody could look into
+  bool was_gone_ = false;  // one of ours, by that news
 };
 
 }  // namespace arbiter::link

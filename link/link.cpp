@@ -27,6 +27,9 @@ using gateway::say;
 
 constexpr int kLookPeriod = 100;    // ms
 constexpr int kRetryPeriod = 1000;  // ms
+// While the network is joined or left: for two minutes at most.
+constexpr shm::Nanoseconds kRoundOfWaiting = 500'000'000;
+constexpr int kMostRoundsOfWaiting = 240;
 // More often than the daemon is asked what is open.
 constexpr shm::Nanoseconds kTellPeriod = 200'000'000;
 
@@ -76,6 +79,17 @@ Link::~Link() {
     gone.swap(imports_);
   }
   end(std::move(gone));
+  // Hundreds of exports may each wait for hosts that are cut off.
+  while_seen([this] { leave_network(); });
+}
+
+template <class Step>
+void Link::while_seen(const Step& step) const {
+  TokenClock rounds([this, left = kMostRoundsOfWaiting]() mutable {
+    if (left-- > 0) options_.on_round();
+  });
+  rounds.set_period(kRoundOfWaiting);
+  step();
 }
 
 // Each waits for Cyclone where it ends, and a component that wants its name must not.
@@ -187,25 +201,40 @@ void Link::join_network(int stop) {
     }
   }
   if (stops_) return;
-  say(Level::kInfo, "host " + options_.host + ", on " + name_of(options_.network) +
-                        (options_.network.interfaces.empty()
-                             ? ": nothing leaves this machine (--interface names a network)"
-                             : ""));
+  const NetworkOptions there = network_there();
+  const std::string text = "host " + options_.host + ", on " + name_of(there);
+  if (there.interfaces.empty()) {
+    say(Level::kInfo, text + ": nothing leaves this machine (--interface names a network)");
+  } else if (there.interfaces.size() == options_.network.interfaces.size()) {
+    say(Level::kInfo, text);
+  } else {
+    say(Level::kWarning, text + " alone: of " + name_of(options_.network) +
+                             " (--interface), the rest is not there now, or has no address");
+  }
+}
+
+NetworkOptions Link::network_there() const {
+  NetworkOptions network = options_.network;
+  std::vector<std::string> there = interfaces_.there();
+  if (!network.interfaces.empty() && !there.empty()) network.interfaces = std::move(there);
+  return network;
 }
 
 void Link::enter_network() {
-  network_.emplace(options_.network);
+  const NetworkOptions there = network_there();
+  // The names of peers are looked up, and a name server may not answer.
+  while_seen([&] { network_.emplace(there); });
   tokens_.emplace(*network_, [this](const TokenMessage& message, std::uint64_t writer) {
     held_.note(message.importer, message.number, writer, shm::monotonic_now());
   });
   demands_.emplace();
   exports_.emplace(*node_, *network_, held_, options_.host, incarnation_, bell_);
   clock_.emplace([this] { tokens_->send({incarnation_, sent_.next(time_with_sleep())}); });
-  desk_->join(*network_, name_of(options_.network), bell_);
+  desk_->join(*network_, name_of(there), bell_);
 }
 
 void Link::leave_network() {
-  desk_->leave();
+  if (desk_ != nullptr) desk_->leave();
   clock_.reset();
   exports_.reset();
   demands_.reset();

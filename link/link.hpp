@@ -45,7 +45,8 @@ struct LinkOptions {
   // model says.
   std::optional<shm::Nanoseconds> max_age;
   // Called by the loop ten times a second, and between calls that wait for the daemon, so that
-  // somebody can see that it goes round.
+  // somebody can see that it goes round; on another thread while the loop joins or leaves the
+  // network.
   std::function<void()> on_round = [] {};
 };
 
@@ -69,9 +70,14 @@ class Link {
  private:
   void make_node(int stop);
   void join_network(int stop);
+  // One of several interfaces that is not there does not keep it from the others.
+  [[nodiscard]] NetworkOptions network_there() const;
   // Throws DdsError; then leave_network() follows.
   void enter_network();
   void leave_network();
+  // Of what Cyclone may need some seconds for.
+  template <class Step>
+  void while_seen(const Step& step) const;
   End loop(int stop);
   // True, and said: the network has to be joined again.
   [[nodiscard]] bool has_network_changed();

@@ -109,7 +109,11 @@ std::vector<Disagreement> Disagreements::look(const std::vector<PresentHost>& ho
   std::size_t standing = 0;
   for (const auto& each : found_) standing += each.second.stands ? 1 : 0;
   for (auto& [subject, each] : found_) {
-    if (!each.stands && (now - each.since < kSettles || standing >= kMost)) continue;
+    if (!each.stands && now - each.since < kSettles) continue;
+    if (!each.stands && standing >= kMost) {
+      if (!make_place_for(subject.first)) continue;
+      --standing;
+    }
     const bool is_new = !std::exchange(each.stands, true);
     standing += is_new ? 1 : 0;
     // Other hosts are news once they are the same for a while.
@@ -118,6 +122,20 @@ std::vector<Disagreement> Disagreements::look(const std::vector<PresentHost>& ho
     news.push_back({subject.first, subject.second, each.hosts});
   }
   return news;
+}
+
+bool Disagreements::make_place_for(DisagreementKind kind) {
+  const auto warning = std::find_if(found_.rbegin(), found_.rend(), [](const auto& each) {
+    return each.second.stands && !is_error(each.first.first);
+  });
+  if (!is_error(kind) || warning == found_.rend()) return false;
+  warning->second.stands = false;
+  return true;
+}
+
+void Disagreements::take_back(const Disagreement& news) {
+  const auto found = found_.find({news.kind, news.name});
+  if (found != found_.end()) found->second.is_reported = false;
 }
 
 void Disagreements::update(Subject subject, std::vector<std::string> hosts, shm::Nanoseconds now) {

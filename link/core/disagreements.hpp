@@ -19,6 +19,10 @@ namespace arbiter::link {
 
 enum class DisagreementKind : std::uint8_t { kInputPort, kSource, kHostName, kModel };
 
+[[nodiscard]] constexpr bool is_error(DisagreementKind kind) noexcept {
+  return kind == DisagreementKind::kInputPort;
+}
+
 struct Disagreement {
   DisagreementKind kind = DisagreementKind::kInputPort;
   std::string name;                // the port's, the source's, the host's; of models: empty
@@ -27,7 +31,7 @@ struct Disagreement {
   // A sentence without its end.
   [[nodiscard]] std::string text() const;
   // Else it is a warning.
-  [[nodiscard]] bool is_error() const noexcept { return kind == DisagreementKind::kInputPort; }
+  [[nodiscard]] bool is_error() const noexcept { return link::is_error(kind); }
 };
 
 // A host whose link is there.
@@ -41,12 +45,15 @@ class Disagreements {
   static constexpr shm::Nanoseconds kSettles = 1'500'000'000;
   // Longer than a lease.
   static constexpr shm::Nanoseconds kNoEarlierLife = 3'000'000'000;
-  // Reported at once; a host may say that it has thousands of ports.
+  // Reported at once; a host may say that it has thousands of ports. Where there is no place for an
+  // error, the last warning gives way.
   static constexpr std::size_t kMost = 64;
 
   // Returns those that were not reported before, and those that others have joined or left since,
   // errors first.
   std::vector<Disagreement> look(const std::vector<PresentHost>& hosts, shm::Nanoseconds now);
+  // Nobody could be told of it: it is news at the next look again.
+  void take_back(const Disagreement& news);
   // Those that stand now, errors first.
   [[nodiscard]] std::vector<Disagreement> standing() const;
 
@@ -61,6 +68,7 @@ class Disagreements {
   };
   using Subject = std::pair<DisagreementKind, std::string>;  // with its name
 
+  [[nodiscard]] bool make_place_for(DisagreementKind kind);
   void update(Subject subject, std::vector<std::string> hosts, shm::Nanoseconds now);
 
   std::map<Subject, Standing> found_;

@@ -13,6 +13,8 @@
 #include <cstring>
 #include <exception>
 
+#include "link/dds/host_search.hpp"
+
 namespace arbiter::link {
 namespace {
 
@@ -184,7 +186,8 @@ void DatagramTrains::Train::depart_alone() noexcept {
 extern "C" dds_return_t ddsrt_sendmsg(ddsrt_socket_t sock, const ddsrt_msghdr_t* msg, int flags,
                                       ssize_t* sent) {
   using arbiter::link::trains_of_thread;
-  if (trains_of_thread != nullptr && trains_of_thread->board(sock, *msg, flags)) {
+  if ((trains_of_thread != nullptr && trains_of_thread->board(sock, *msg, flags)) ||
+      arbiter::link::HostSearch::of_process().send(sock, *msg, flags)) {
     *sent = static_cast<ssize_t>(arbiter::link::bytes_of(*msg));
     return DDS_RETCODE_OK;
   }

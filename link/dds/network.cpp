@@ -14,6 +14,7 @@
 
 #include "gateway/dds/domain.hpp"
 #include "link/core/event_header.hpp"
+#include "link/dds/host_search.hpp"
 #include "link/dds/security.hpp"
 
 namespace arbiter::link {
@@ -85,6 +86,7 @@ std::string configuration_of(const NetworkOptions& options) {
 }
 
 Domain::Domain(const NetworkOptions& options) {
+  if (!options.peers.empty()) HostSearch::of_process().begin(options.domain);
   const std::vector<int> before = datagram_sockets();
   entity_ = Entity(dds_create_domain(options.domain, configuration_of(options).c_str()),
                    "DDS domain " + std::to_string(options.domain));

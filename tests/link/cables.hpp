@@ -5,15 +5,20 @@
 // namespaces, however the test ends.
 #pragma once
 
+#include <fcntl.h>
 #include <gtest/gtest.h>
 #include <poll.h>
+#include <sched.h>
 #include <unistd.h>
 
 #include <filesystem>
+#include <functional>
 #include <stdexcept>
 #include <string>
+#include <thread>
 #include <vector>
 
+#include "shm/file_descriptor.hpp"
 #include "tests/support/child_process.hpp"
 
 namespace arbiter::test {
@@ -50,6 +55,17 @@ class NetworkNamespace {
  private:
   ChildProcess holder_;
 };
+
+// On a thread whose network, and that of the threads it makes, is that place's.
+inline void run_in(const NetworkNamespace& place, const std::function<void()>& run) {
+  std::thread thread([&] {
+    const shm::FileDescriptor there(
+        ::open(("/proc/" + place.pid() + "/ns/net").c_str(), O_RDONLY | O_CLOEXEC));
+    ASSERT_EQ(::setns(there.get(), CLONE_NEWNET), 0);
+    run();
+  });
+  thread.join();
+}
 
 class Switch {
  public:

@@ -12,6 +12,7 @@
 #include <memory>
 #include <string>
 
+#include "link/say_sparingly.hpp"
 #include "shm/clock.hpp"
 #include "tests/cli/arbiter_program.hpp"
 #include "tests/link/scene.hpp"
@@ -108,6 +109,16 @@ TEST_F(DeskWithoutANetwork, EndsWithoutWaitingForAnOpenQuestion) {
   answer.resize(static_cast<std::size_t>(
       std::max<ssize_t>(::recv(program->get(), answer.data(), answer.size(), 0), 0)));
   EXPECT_EQ(answer, "the link ends");
+}
+
+// Where many sources come and go at once, for example.
+TEST(WhatIsSaidSparingly, LeavesRoomForWhatIsWrong) {
+  using gateway::Level;
+  for (int i = 0; i < 200; ++i) {
+    if (!link::say_sparingly(Level::kInfo, "a source comes from another host")) break;
+    ASSERT_LT(i, 150);
+  }
+  EXPECT_TRUE(link::say_sooner_or_later(Level::kError, "a port is open on several hosts"));
 }
 
 class DeskWithTooManyHosts : public DeskWithoutANetwork {};

@@ -1,17 +1,14 @@
 // The interface by which a link reaches the other hosts: it comes late, goes, changes its address,
 // or can do no multicast.
-#include <fcntl.h>
 #include <gtest/gtest.h>
-#include <sched.h>
+#include <sys/resource.h>
 
 #include <functional>
 #include <string>
-#include <thread>
 #include <vector>
 
 #include "link/dds/network.hpp"
 #include "link/interface_watch.hpp"
-#include "shm/file_descriptor.hpp"
 #include "tests/client/models.hpp"
 #include "tests/link/cabled_robot.hpp"
 #include "tests/link/known_hosts.hpp"
@@ -82,6 +79,32 @@ TEST_F(Cable, AnInterfaceThatGoesAndComesBackIsUsedAgain) {
       "joining the network again");
 }
 
+// As a second cable may.
+TEST_F(Cable, OneOfTwoInterfacesMayGoAndComeBack) {
+  CabledRobot robot;
+  const auto plug_in = [&] {
+    robot.head_network.ip("link add eth1 type veth peer name other1");
+    robot.head_network.ip("addr add 10.78.0.1/24 dev eth1");
+    for (const std::string each : {"eth1", "other1"}) {
+      robot.head_network.ip("link set " + each + " up");
+    }
+  };
+  plug_in();
+  const std::vector<std::string> both{"--interface", "eth0", "--interface", "eth1"};
+  Host head("head", robot.runtime, source_model("300ms"), both, robot.head_network.enter());
+  Host base = robot.base(motor_model("300ms"));
+  Planner planner(head);
+  Body body(base);
+  body.drive(planner);
+  head.see("host head, on eth0, eth1\n");
+  robot.head_network.ip("link del eth1");
+  head.see("host head, on eth0 alone: of eth0, eth1 (--interface), the rest is not there now");
+  body.drive(planner);
+  plug_in();
+  head.see("the network interface eth1 has the address 10.78.0.1 now: joining the network again");
+  body.drive(planner);
+}
+
 // Who switches all hosts is told of one that is gone, whatever this link has been through since.
 TEST_F(Cable, ALinkThatJoinsAgainRemembersWhoIsGone) {
   CabledRobot robot;
@@ -126,17 +149,6 @@ TEST_F(Cable, AnInterfaceThatIsSwitchedOffAndOnIsUsedAgain) {
       "");
 }
 
-// On a thread whose network, and that of the threads it makes, is that place's.
-void run_in(const NetworkNamespace& place, const std::function<void()>& run) {
-  std::thread thread([&] {
-    const shm::FileDescriptor there(
-        ::open(("/proc/" + place.pid() + "/ns/net").c_str(), O_RDONLY | O_CLOEXEC));
-    ASSERT_EQ(::setns(there.get(), CLONE_NEWNET), 0);
-    run();
-  });
-  thread.join();
-}
-
 // Cyclone ends its threads by sending to its own address, which is gone: nobody has noticed yet.
 TEST_F(Cable, ANetworkEndsThoughItsAddressGoesJustThen) {
   Switch cables;
@@ -163,6 +175,26 @@ TEST_F(Cable, OfManyChangesALinkHearsSomeBeforeItJoins) {
     watch.begin();
     EXPECT_EQ(watch.missing(), "");
     EXPECT_EQ(watch.change(), "a network interface was gone");
+    EXPECT_EQ(watch.change(), "");
+  });
+}
+
+TEST_F(Cable, AChangeForWhichNoDescriptorWasLeftIsLookedIntoLater) {
+  Switch cables;
+  const NetworkNamespace place;
+  cables.connect(place, kHead);
+  run_in(place, [&] {
+    link::InterfaceWatch watch({"eth0"});
+    watch.begin();
+    place.ip("addr del 10.77.0.1/24 dev eth0");
+    place.ip("addr add 10.77.0.9/24 dev eth0");
+    rlimit usual{};
+    ASSERT_EQ(::getrlimit(RLIMIT_NOFILE, &usual), 0);
+    const rlimit none{0, usual.rlim_max};
+    ASSERT_EQ(::setrlimit(RLIMIT_NOFILE, &none), 0);
+    EXPECT_EQ(watch.change(), "");
+    ASSERT_EQ(::setrlimit(RLIMIT_NOFILE, &usual), 0);
+    EXPECT_EQ(watch.change(), "the network interface eth0 has the address 10.77.0.9 now");
     EXPECT_EQ(watch.change(), "");
   });
 }

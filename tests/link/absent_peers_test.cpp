@@ -1,0 +1,137 @@
+// What --peer names need not be there: a machine that is off, or a name that nobody can look up
+// now.
+#include <arpa/inet.h>
+#include <dds/ddsrt/retcode.h>
+#include <dds/ddsrt/sockets.h>
+#include <gtest/gtest.h>
+#include <linux/sockios.h>
+#include <netinet/in.h>
+#include <sys/ioctl.h>
+#include <sys/socket.h>
+#include <sys/un.h>
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <cstring>
+#include <fstream>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "link/dds/host_search.hpp"
+#include "shm/file_descriptor.hpp"
+#include "tests/link/cabled_robot.hpp"
+#include "tests/link/robot.hpp"
+
+namespace arbiter::test {
+namespace {
+
+constexpr std::uint32_t kDomain = 43;
+constexpr int kDiscoveryPort = 18160;
+
+// As Cyclone sends; false: the socket is full.
+bool send_to(const shm::FileDescriptor& socket, const std::string& address, int port) {
+  sockaddr_in to{};
+  to.sin_family = AF_INET;
+  to.sin_port = htons(static_cast<std::uint16_t>(port));
+  ::inet_pton(AF_INET, address.c_str(), &to.sin_addr);
+  std::array<char, 400> bytes{};
+  iovec part{bytes.data(), bytes.size()};
+  msghdr message{};
+  message.msg_name = &to;
+  message.msg_namelen = sizeof to;
+  message.msg_iov = &part;
+  message.msg_iovlen = 1;
+  ssize_t sent = 0;
+  return ddsrt_sendmsg(socket.get(), &message, MSG_DONTWAIT, &sent) == DDS_RETCODE_OK;
+}
+
+// The kernel keeps what goes to them until it knows that they are not there.
+TEST_F(Cable, WhatIsSaidToHostsThatAreOffIsNotInTheWayOfOthers) {
+  Switch cables;
+  const NetworkNamespace place;
+  cables.connect(place, kHead);
+  run_in(place, [] {
+    link::HostSearch::of_process().begin(kDomain);
+    const shm::FileDescriptor socket(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0));
+    for (int each = 100; each < 100 + 4; ++each) {
+      const std::string address = "10.77.0." + std::to_string(each);
+      for (int i = 0; i < 300; ++i) {
+        ASSERT_TRUE(send_to(socket, address, kDiscoveryPort + 2 * (i % 33)));
+      }
+    }
+    int waiting = -1;
+    ASSERT_EQ(::ioctl(socket.get(), SIOCOUTQ, &waiting), 0);
+    EXPECT_EQ(waiting, 0);
+    // Samples leave by the socket that Cyclone has for them.
+    ASSERT_TRUE(send_to(socket, "10.77.0.100", kDiscoveryPort + 1));
+    ASSERT_EQ(::ioctl(socket.get(), SIOCOUTQ, &waiting), 0);
+    EXPECT_GT(waiting, 0);
+  });
+}
+
+TEST_F(Cable, HostsFindEachOtherThoughOthersAreOff) {
+  CabledRobot robot;
+  for (const int each : {kHead, kBase}) robot.cables.drop_multicast_to(each);
+  std::vector<std::string> arguments = CabledRobot::arguments();
+  for (const int each : {kHead, kBase, 100, 101, 102, 103, 104, 105}) {
+    arguments.insert(arguments.end(), {"--peer", "10.77.0." + std::to_string(each)});
+  }
+  Host head("head", robot.runtime, source_model("300ms"), arguments, robot.head_network.enter());
+  Host base("base", robot.runtime, motor_model("300ms"), arguments, robot.base_network.enter());
+  Planner planner(head);
+  Body body(base);
+  for (int i = 0; i < 100; ++i) body.drive(planner);
+}
+
+// What a service tells systemd.
+class NotifySocket {
+ public:
+  explicit NotifySocket(std::string path)
+      : path_(std::move(path)), socket_(::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0)) {
+    sockaddr_un address{};
+    address.sun_family = AF_UNIX;
+    std::strncpy(address.sun_path, path_.c_str(), sizeof address.sun_path - 1);
+    EXPECT_EQ(::bind(socket_.get(), reinterpret_cast<sockaddr*>(&address), sizeof address), 0);
+  }
+  [[nodiscard]] const std::string& path() const { return path_; }
+  [[nodiscard]] std::string take() const {
+    std::array<char, 100> bytes{};
+    const ssize_t size = ::recv(socket_.get(), bytes.data(), bytes.size(), 0);
+    return {bytes.data(), static_cast<std::size_t>(std::max<ssize_t>(size, 0))};
+  }
+
+ private:
+  const std::string path_;
+  const shm::FileDescriptor socket_;
+};
+
+// Else systemd would start the link again and again. Where nobody is asked it is seen twice until
+// it has joined: before it looks for its daemon, and before it joins.
+TEST_F(Cable, ALinkIsSeenToRunWhileANameServerDoesNotAnswer) {
+  CabledRobot robot;
+  robot.base_network.ip("route add default via 10.77.0.200");
+  const NotifySocket systemd(robot.runtime.path() + "/notify");
+  const std::string servers = robot.runtime.path() + "/resolv.conf";
+  std::ofstream(servers) << "nameserver 192.0.2.1\noptions timeout:1 attempts:2\n";
+  std::vector<std::string> by = robot.base_network.enter();
+  by.insert(by.end(), {"/usr/bin/unshare", "-m", "/bin/sh", "-c",
+                       "mount --bind " + servers +
+                           " /etc/resolv.conf && NOTIFY_SOCKET=" + systemd.path() + " exec \"$@\"",
+                       "sh"});
+  std::vector<std::string> arguments = CabledRobot::arguments();
+  arguments.insert(arguments.end(), {"--peer", "head.example"});
+  const Host base("base", robot.runtime, kNoRules, arguments, by);
+  int seen = 0;
+  for (bool is_joined = false; !is_joined;) {
+    const bool is_seen = systemd.take() == "WATCHDOG=1";
+    is_joined = base.log().find("host base, on eth0") != std::string::npos;
+    seen += is_seen && !is_joined ? 1 : 0;
+  }
+  EXPECT_GT(seen, 2) << base.log();
+  EXPECT_NE(base.log().find("cannot be found out now"), std::string::npos) << base.log();
+}
+
+}  // namespace
+}  // namespace arbiter::test
