@@ -154,7 +154,7 @@ class ChannelReader {
         state_ = State::kMisbehaved;
         return false;
       }
-      next_ = channel.first.load(std::memory_order_relaxed) & kSequenceMask;
+      next_ = first_ = channel.first.load(std::memory_order_relaxed) & kSequenceMask;
       channel_ = &channel;
       ring_ = segment_.ring(index, self_);
       position_ = 0;
@@ -261,23 +261,30 @@ class ChannelReader {
   // The sequence of the newest entry; all that came before a decision may be dropped by it, nothing
   // that came after. SYNC POINT: backlog-counted (see ChannelWriter::push()).
   [[nodiscard]] std::uint64_t backlog_end() const noexcept {
-    return state_ == State::kJoined
-               ? channel_->accepted.load(std::memory_order_acquire) & kSequenceMask
-               : next_ - 1;
+    return state_ == State::kJoined ? accepted() : next_ - 1;
   }
-  // The same of a queue that may have ended: by now the channel may count for the next one.
+  // The same of a queue that may have ended: by now the channel may count for the next one, which
+  // begins where this one ended, or where this one began, if nothing came to it. Relaxed is enough
+  // for `first`: who sees what the next one has accepted sees where it began.
   [[nodiscard]] std::uint64_t last_end() const noexcept {
-    const std::uint64_t end = backlog_end();
-    if (state_ != State::kJoined) return end;
+    if (state_ != State::kJoined && state_ != State::kLeft) return next_ - 1;
+    const std::uint64_t end = accepted();
     // SYNC POINT: channel-joined (see ChannelWriter::join()).
     const PortInstance receiver = channel_->receiver.load(std::memory_order_acquire);
-    if (receiver == self_ || receiver == 0) return end;
-    return (channel_->first.load(std::memory_order_relaxed) - 1) & kSequenceMask;
+    const std::uint64_t first = channel_->first.load(std::memory_order_relaxed) & kSequenceMask;
+    const bool may_be_ours = receiver == self_ || receiver == 0;
+    return may_be_ours && first == first_ ? end : (first - 1) & kSequenceMask;
   }
-  // How many entries wait, given that end; at most the depth, whatever the publisher says.
-  [[nodiscard]] std::uint64_t backlog(std::uint64_t end) const noexcept {
+  // How many entries are not consumed, given that end: those that wait, and those that were
+  // overtaken before they were looked at.
+  [[nodiscard]] std::uint64_t unread(std::uint64_t end) const noexcept {
     const std::uint64_t count = (end + 1 - next_) & kSequenceMask;
-    return count > kSequenceMask / 2 ? 0 : (count < depth_ ? count : depth_);
+    return count > kSequenceMask / 2 ? 0 : count;
+  }
+  // How many of them wait; at most the depth, whatever the publisher says.
+  [[nodiscard]] std::uint64_t backlog(std::uint64_t end) const noexcept {
+    const std::uint64_t count = unread(end);
+    return count < depth_ ? count : depth_;
   }
 
   // The same, with those that were overtaken before they were looked at, and with one that its
@@ -307,6 +314,11 @@ class ChannelReader {
  private:
   static constexpr int kMaxTries = 64;
 
+  // SYNC POINT: backlog-counted (see ChannelWriter::push()).
+  [[nodiscard]] std::uint64_t accepted() const noexcept {
+    return channel_->accepted.load(std::memory_order_acquire) & kSequenceMask;
+  }
+
   // A sample's lines lie in the publisher's cache: let them come while we decide.
   void prefetch_sample(Entry entry) const noexcept {
     prefetch(&segment_.slot_header(slot_of(entry)));
@@ -328,7 +340,8 @@ class ChannelReader {
 
   const Channel* channel_ = nullptr;
   const Atomic<Entry>* ring_ = nullptr;
-  std::uint64_t next_ = 1;      // sequence of the oldest entry that is not consumed
+  std::uint64_t first_ = 1;     // sequence of the first entry
+  std::uint64_t next_ = 1;      // of the oldest one that is not consumed
   std::uint32_t position_ = 0;  // its index
   std::uint32_t depth_ = 1;
   State state_ = State::kUnjoined;

@@ -79,11 +79,14 @@ void InputCore::retire_queue(Queue& queue, const InputView& next) {
                link.peer->instance > queue.peer->instance;
       });
   shm::InputCounters& counters = segment_->header.counters;
+  join(queue);
   if (is_succeeded) {
-    join(queue);
     count(counters.overtaken, queue.reader.left_behind());
   } else {
-    count(counters.dropped, queue.reader.backlog(queue.reader.last_end()));
+    const std::uint64_t end = queue.reader.last_end();
+    const std::uint64_t waiting = queue.reader.backlog(end);
+    count(counters.dropped, waiting);
+    count(counters.overtaken, queue.reader.unread(end) - waiting);
   }
   if (queue.peer->held != 0) {
     auto kept = std::make_unique<InputView>();

@@ -1,6 +1,8 @@
 // The queue of each connection: its depth, what gives way, and who can still be read.
 #include <gtest/gtest.h>
 
+#include <string>
+
 #include <arbiter/arbiter.hpp>
 
 #include "tests/client/component.hpp"
@@ -148,6 +150,39 @@ TEST(Queue, AnOverrideDropsWhatADeadPublisherLeft) {
   stop.deactivate();
   EXPECT_FALSE(in.take());
   EXPECT_EQ(daemon.input("/in")["dropped"], 3);
+}
+
+// Also by a receiver that looks at its queue before it hears that it has ended.
+TEST(Queue, WhatWaitsWhenAnotherModelEndsItIsCounted) {
+  for (const bool comes_back : {false, true}) {
+    for (const bool looks_first : {false, true}) {
+      for (const int samples : {3, 6}) {
+        Daemon daemon(single_model());
+        NodeOptions options;
+        options.service_thread = false;
+        Node node("receiver", options);
+        auto in = node.input_port<Number>("/in", {.depth = 4});
+        Component sender("sender");
+        ASSERT_EQ(sender.tell("output /out"), "open");
+        node.service();
+        EXPECT_EQ(sender.tell("publish /out 1"), "1 0 0");
+        EXPECT_EQ(take_from(in), 1);
+        EXPECT_EQ(sender.tell("publish /out 1 " + std::to_string(samples)), "1 0 0");
+        daemon.load(only("other"));
+        sender.tell("publish /out 1");  // takes it up
+        if (comes_back) daemon.load(single_model());
+        sender.tell("publish /out 1");
+        if (looks_first) static_cast<void>(in.take());
+        node.service();
+        while (in.take()) {
+        }
+        const auto counted = daemon.input("/in");
+        const int all = counted["taken"].get<int>() + counted["dropped"].get<int>() +
+                        counted["overtaken"].get<int>();
+        EXPECT_EQ(daemon.source("/out")["delivered"], all) << counted;
+      }
+    }
+  }
 }
 
 // Each new receiver gets what is published from its coming on, whoever had its place before.

@@ -193,5 +193,46 @@ const Register kWaiting("WhatTheNextLinkAcceptsIsNotCountedForTheLast", {3, 2},
                           explore(go_on_without(world, 2, count_what_waits));
                         });
 
+void count_after_a_look(World& world) {
+  const std::uint64_t taken = world.receiver.take() ? 1 : 0;
+  const shm::ChannelReader& reader = world.receiver.reader;
+  require(taken + reader.unread(reader.last_end()) == 1, "a sample is not counted, or twice");
+}
+const Register kLooking("WhatWaitedIsCountedThoughItsReceiverHasFoundTheQueueEnded", {3, 2},
+                        [](const Explore& explore) {
+                          World world;
+                          explore(go_on_without(world, 2, count_after_a_look));
+                        });
+
+// Then the next one begins where this one did.
+Explorer::Scenario go_on_without_an_empty_one(World& world) {
+  return [&world](Execution& execution) {
+    world.reset(2);
+    const auto begin_queue = [&world](shm::PortInstance receiver) {
+      Publisher& publisher = world.publisher;
+      publisher.writer.leave([&](std::uint32_t slot) { publisher.pool.evict(slot); });
+      publisher.writer = shm::ChannelWriter(publisher.segment, 0);
+      publisher.writer.join(receiver, 1, 2);
+    };
+    begin_queue(kReceiver);
+    shm::ChannelReader& reader = world.receiver.reader;
+    reader = shm::ChannelReader(world.publisher.segment, kPublisher, kReceiver);
+    reader.join();
+    execution.thread([&world, begin_queue] {
+      begin_queue(kNext);
+      world.publisher.publish();
+      world.publisher.publish();
+    });
+    execution.thread([&reader] {
+      require(reader.unread(reader.last_end()) == 0, "samples of another's count as lost");
+    });
+  };
+}
+const Register kEmpty("OfAQueueThatNothingCameToNothingIsCounted", {3, 2},
+                      [](const Explore& explore) {
+                        World world;
+                        explore(go_on_without_an_empty_one(world));
+                      });
+
 }  // namespace
 }  // namespace arbiter::explore::channel_cases
