@@ -164,10 +164,10 @@ std::shared_ptr<SharedMemory> NodeCore::memory() {
   return memory_;
 }
 
+// Of a tap, whose number may be another's by now, only the daemon is told: see open_tap().
 void NodeCore::forget_port(shm::PortInstance port) {
   outputs_.erase(port);
   inputs_.erase(port);
-  taps_.erase(port);
   given_.erase(port);
   descriptions_.erase(port);
   say_closed(port);
@@ -258,7 +258,10 @@ wire::Received NodeCore::converse(const wire::Message& question,
       say_who_has_ended(Whom::kAll);  // before a name is asked for that is kept for one of them
       // A port that another daemon has opened was handed back to this one: what is left is to be
       // connected.
-      if (question.kind == wire::MessageKind::kOpenTap) reply.opened = 0;
+      if (question.kind == wire::MessageKind::kOpenTap) {
+        reply.opened = 0;
+        reply.refusal.clear();
+      }
       if (reply.opened != 0) {
         numbered = wire::Message();
         numbered.kind = wire::MessageKind::kConnect;

@@ -106,12 +106,18 @@ std::shared_ptr<TapCore> NodeCore::open_tap(std::string_view name, const Type& t
     core->process = process_;
     wire::Message question = message_of(wire::MessageKind::kOpenTap, name);
     question.flags = options.of == TapOf::input ? wire::kTapsInput : 0u;
-    converse(question, {core->segment_descriptor().get(), core->bell().for_publishers().get()},
-             nullptr, [&](wire::Received& opened) {
-               taps_.erase(core->instance());  // that another daemon has opened
-               core->bind(opened.message.port);
-               taps_[opened.message.port] = core;
-             });
+    try {
+      converse(question, {core->segment_descriptor().get(), core->bell().for_publishers().get()},
+               nullptr, [&](wire::Received& opened) {
+                 taps_.erase(core->instance());  // that another daemon has opened
+                 core->bind(opened.message.port);
+                 taps_[opened.message.port] = core;
+               });
+    } catch (...) {
+      const std::lock_guard lock(mutex_);
+      std::erase_if(taps_, [&](const auto& each) { return each.second == core; });
+      throw;
+    }
     return core;
   });
 }

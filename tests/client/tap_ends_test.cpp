@@ -5,7 +5,9 @@
 #include <cstddef>
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <string>
+#include <utility>
 
 #include <arbiter/arbiter.hpp>
 
@@ -274,6 +276,34 @@ TEST(Tap, OpenedByADaemonThatIsReplacedAtOnceIsKnownToTheNext) {
   await([&] { return daemon.source("/out")["open"] == true; });
   auto last = node.input_port<Number>("/last");  // what the node has said before has been heard
   EXPECT_EQ(daemon.taps_of("/out"), 1u);
+}
+
+// Each daemon gives it another number: it was looked for by the first one's.
+TEST(Tap, OpenedByADaemonWhoseSuccessorDoesNotAnswerLeavesNothing) {
+  Daemon daemon(single_model());
+  Component stopped("stopped");  // or the tap would be connected at once
+  ASSERT_EQ(stopped.tell("output /in"), "open");
+  stopped.process().stop();
+  std::optional<Node> node;
+  bool is_replaced = false;
+  NodeOptions options;
+  options.service_thread = false;
+  options.connect_timeout = std::chrono::milliseconds(100);
+  // That the tap is of the wrong end, said once it has its number and before it is connected.
+  options.on_notice = [&](const Notice&) {
+    if (std::exchange(is_replaced, true)) return;
+    daemon.kill();
+    daemon.restart();
+    auto answered_by_the_next = node->input_port<Number>("/another");
+    daemon.process().stop();
+  };
+  node.emplace("test", options);
+  const std::string error = error_of([&] { auto tap = node->tap<Number>("/in"); });
+  EXPECT_NE(error.find("has not answered"), std::string::npos) << error;
+  EXPECT_TRUE(is_replaced);
+  daemon.process().signal(SIGCONT);
+  node.reset();
+  await([&] { return daemon.status()["clients"] == 1; });
 }
 
 }  // namespace
