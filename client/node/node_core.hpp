@@ -245,6 +245,7 @@ class NodeCore : public std::enable_shared_from_this<NodeCore> {
   bool has_no_ports_ = false;       // rejoining without any: other memory will do as well
   shm::Nanoseconds asked_ = 0;      // when we asked to rejoin
   bool has_told_of_clock_ = false;  // that the daemon's is another
+  int refusals_ = 0;                // in a row, of daemons that did not take us back
   bool stopping_ = false;
   std::uint64_t next_request_ = 1;
   std::map<std::uint64_t, Reply> replies_;

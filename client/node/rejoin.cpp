@@ -35,6 +35,9 @@ constexpr std::chrono::milliseconds kRejoinInterval{50};
 // could not be taken up.
 constexpr std::chrono::milliseconds kTurnedAwayInterval{1000};
 
+// One comes each second.
+constexpr int kToldRefusal = 3;
+
 bool is_sent(const shm::FileDescriptor& socket, const wire::Message& message,
              std::array<int, wire::kMaxDescriptors> descriptors = {-1, -1}) {
   return wire::send_message(socket.get(), message, descriptors) == wire::SendResult::kSent;
@@ -214,6 +217,7 @@ void NodeCore::be_welcomed(wire::Received& welcome) {
   ++conversation_;
   node_ = welcome.message.link;
   turned_away_.clear();
+  refusals_ = 0;
   say_who_has_ended(Whom::kAll);
   for (const auto& [instance, output] : outputs_) output->doubt_taps();
   describe_again();
@@ -221,9 +225,15 @@ void NodeCore::be_welcomed(wire::Received& welcome) {
   news_.notify_all();
 }
 
-// The conversation is over; but the daemon may be replaced by one that knows us.
+// The conversation is over; but the daemon may be replaced by one that knows us. It is told once,
+// and not if a daemon merely has no descriptor to spare for a moment.
 void NodeCore::be_turned_away(const wire::Message& refusal) {
   turned_away_ = refusal.text_view();
+  if (++refusals_ == kToldRefusal) {
+    note(NoticeKind::apart, 0, {},
+         "components that come now do not see \"" + name_ +
+             "\", which goes on with those that it is connected to: " + turned_away_);
+  }
   be_alone(kTurnedAwayInterval);
 }
 

@@ -2,6 +2,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <future>
+
+#include <arbiter/arbiter.hpp>
+
 #include "tests/client/component.hpp"
 #include "tests/client/models.hpp"
 #include "tests/support/await.hpp"
@@ -52,6 +56,23 @@ TEST(Strangers, AreInTheStatusWithTheirPortsForAsLongAsTheyLive) {
   EXPECT_GT(told["since_ns"], 0);
   arm.process().kill();
   EXPECT_EQ(strangers(daemon), json::array());
+}
+
+// Whose ports nobody new sees, a supervisor starts again, if it is told.
+TEST(Strangers, AreToldThemselves) {
+  Daemon daemon(single_model());
+  std::promise<Notice> told;
+  NodeOptions options;
+  options.on_notice = [&](const Notice& notice) {
+    if (notice.kind == NoticeKind::apart) told.set_value(notice);
+  };
+  Node arm("arm", options);
+  const auto in = arm.input_port<int>("/in");
+  restart_without_state(daemon);
+  const Notice notice = told.get_future().get();
+  EXPECT_EQ(notice.port, "");
+  EXPECT_THAT(notice.text, testing::HasSubstr("components that come now do not see \"arm\""));
+  EXPECT_THAT(notice.text, testing::HasSubstr("restart the component"));
 }
 
 TEST(Strangers, AreLoggedOnceThoughTheyAskAgainAndAgain) {

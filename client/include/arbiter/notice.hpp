@@ -21,8 +21,10 @@ enum class NoticeKind : std::uint8_t {
   unmentioned,
   // The port cannot see a source that its rules read: it delivers nothing until it can.
   blind,
-  // This node and others of the instance do not see each other: they have met at two daemons, or
-  // the next daemon has another clock, as in another time namespace. It concerns no port.
+  // This node and others of the instance do not see each other: they have met at two daemons; or
+  // the next daemon has another clock, as in another time namespace; or it has not taken the node
+  // back for two seconds, as where the state of the daemon before is lost. The text says what to
+  // do. It concerns no port.
   apart,
   // Memory could not be locked (NodeOptions::lock_memory); it is used all the same.
   not_locked,
