@@ -11,6 +11,7 @@
 #include <cerrno>
 #include <cstring>
 #include <stdexcept>
+#include <system_error>
 #include <utility>
 
 #include "service/kept/step.hpp"
@@ -103,7 +104,7 @@ void Daemon::unwatch(int fd) const noexcept { epoll_ctl(epoll_.get(), EPOLL_CTL_
 int Daemon::timeout_ms() const {
   const bool may_change = takeover_.is_over() && changes_.can_advance();
   if (!turns_.empty() || !lobby_.empty() || is_more_to_tell_ || may_change ||
-      (try_postponed_ && !postponed_.empty()))
+      !names_.closed().empty() || (try_postponed_ && !postponed_.empty()))
     return 0;
   shm::Nanoseconds deadline =
       std::min({barriers_.next_deadline(), takeover_.deadline(), introductions_.deadline(),
@@ -243,6 +244,7 @@ void Daemon::look_after_the_loop(shm::Nanoseconds now) {
     watch(listener_.socket.get(), Tag::kListener, 0, EPOLLIN);
   }
   look_in_flight(now);
+  names_.closed().give_up(shm::monotonic_now() + kMaxTurn);
   const std::string lost = wire::Errands::of_the_process().look_after(now);
   if (!lost.empty()) log::warn("{}", lost);
 }
@@ -339,11 +341,11 @@ void Daemon::handle_or_refuse(Client& client, wire::Received& received, shm::Nan
   } catch (const RefusedAgain& again) {  // every second: one line for each component is enough
     refuse(client, received.message.request, again.what());
     return;
-  } catch (const LimitExceeded& limit) {
-    why = limit.what();
-    is_ours = true;
   } catch (const std::exception& error) {
     why = error.what();
+    // For want of a share; or of a descriptor, or memory, to keep it by.
+    is_ours = is_ours || dynamic_cast<const LimitExceeded*>(&error) != nullptr ||
+              dynamic_cast<const std::system_error*>(&error) != nullptr;
   }
   if (Takeover::note_refusal(client, received.message, why, is_ours)) {
     log_refusal(client, received.message, why);

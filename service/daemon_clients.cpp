@@ -156,7 +156,7 @@ void Daemon::drop(ClientId id) {
   switchboard_.lose_taps(*client, is_away);
   if (is_away) takeover_.set_away(*client);
   while (!client->ports.empty()) remove_port(*client->ports.begin());
-  for (const auto& [port, charge] : client->to_hand_back) switchboard_.forget_away(port);
+  switchboard_.forget_away(client->to_hand_back);
   observers_.forget(id);
   barriers_.forget(id);
   left_unread_.add(client->release_unread());

@@ -25,14 +25,14 @@ Client* Daemon::find_holder(const Client& asking, shm::PortInstance holder) {
   if (const auto* output = switchboard_.output(holder)) client = output->client;
   if (const auto* input = switchboard_.input(holder)) client = input->client;
   if (client == nullptr || client == &asking) return client;
-  if (client->has_died()) {
-    drop(client->id());
-    return nullptr;
-  }
   // What others sent earlier may come later, for each has a socket of its own.
   client->read_ahead();
-  if (!client->take_closing_of(holder)) return client;
-  remove_port(holder);
+  if (client->take_closing_of(holder)) {
+    close_port(*client, holder);
+    return nullptr;
+  }
+  if (!client->has_gone()) return client;
+  drop(client->id());  // for one that is only dying yet its names are kept a moment longer
   return nullptr;
 }
 
@@ -67,6 +67,7 @@ void Daemon::remove_port(shm::PortInstance port) {
 }
 
 void Daemon::open_output(Client& client, wire::Received& received) {
+  names_.closed().make_room();
   const std::string name = port_name(received.message);
   gate_.require(client, Action::kOutput, name);
   auto port = adopt_output(received, client.user());
@@ -118,6 +119,7 @@ void Daemon::finish_opening(Client& client, std::uint64_t request, std::unique_p
 }
 
 void Daemon::open_input(Client& client, wire::Received& received) {
+  names_.closed().make_room();
   const std::string name = port_name(received.message);
   gate_.require(client, Action::kInput, name);
   auto port = adopt_input(received, client.user());

@@ -230,10 +230,14 @@ bool Client::take_closing_of(shm::PortInstance port) {
     return (message.kind == wire::MessageKind::kClosePort && message.port == port) ||
            (message.kind == wire::MessageKind::kNodeEnded && message.link == node);
   });
-  if (closing == ahead_.end()) return ahead_ended_ && (!comes_back || is_dying());
+  if (closing == ahead_.end()) return false;
   // The end of the node closes others too.
   if (closing->received().message.kind == wire::MessageKind::kClosePort) ahead_.erase(closing);
   return true;
+}
+
+bool Client::has_gone() const {
+  return has_died() || (ahead_ended_ && (!comes_back || is_dying()));
 }
 
 // Where it has not ended after that, its number has not been another's meanwhile.

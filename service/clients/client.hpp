@@ -59,9 +59,10 @@ class Client {
   void read_ahead();
   // Throws LimitExceeded, and then `received` is as it was.
   [[nodiscard]] PutAside put_aside(wire::Received& received) { return {received, user_, shares_}; }
-  // Of what was read ahead: takes out the closing of a port, if it is there. The end of a
-  // conversation is one too, unless the component may come back for the port.
+  // Of what was read ahead: takes out the closing of a port, if it is there.
   [[nodiscard]] bool take_closing_of(shm::PortInstance port);
+  // Whether it has said all that it ever will, and will not come back.
+  [[nodiscard]] bool has_gone() const;
   // Whether anything was read ahead, be it that the client has hung up.
   [[nodiscard]] bool has_read_ahead() const { return !ahead_.empty() || ahead_ended_; }
   [[nodiscard]] bool has_queue() const { return !queue_.empty(); }

@@ -100,6 +100,14 @@ void Shares::pass_to(uid_t user, Charge& charge, std::uint64_t left) {
   charge = allows(user, what, amount + left) ? take(user, what, amount) : take_own(what, amount);
 }
 
+void Shares::make_own(Charge& charge) {
+  if (!charge || charge.is_own()) return;
+  const Share what = charge.what_;
+  const std::uint64_t amount = charge.amount_;
+  charge = {};
+  charge = take_own(what, amount);
+}
+
 void Shares::give_back(const Charge& charge) noexcept {
   const std::size_t at = index(charge.what_);
   ARBITER_ASSERT(all_.taken[at] >= charge.amount_, "more of a share is given back than was taken");

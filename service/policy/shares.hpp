@@ -99,6 +99,8 @@ class Shares {
   // What the daemon has taken for itself is the user's from now on, as far as it is within the
   // user's share, and `left` more are.
   void pass_to(uid_t user, Charge& charge, std::uint64_t left = 0);
+  // What a user has taken is the daemon's own from now on.
+  void make_own(Charge& charge);
 
   [[nodiscard]] bool allows(uid_t user, Share what, std::uint64_t amount) const;
   [[nodiscard]] std::uint64_t taken(uid_t user, Share what) const;

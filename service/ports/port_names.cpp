@@ -108,7 +108,7 @@ void PortNames::restore(const TablesInUse& tables) {
   let_go_all();
 }
 
-bool PortNames::take_page(shm::SourceId id, const shm::FileDescriptor& page) {
+bool PortNames::take_page(shm::SourceId id, const shm::FileDescriptor& page, bool is_stored) {
   Source* source = source_by_id(id);
   if (source == nullptr || source->name.empty() ||
       shm::identity_of(page).inode != registry_.source(id).page_inode(source->page_number)) {
@@ -118,12 +118,13 @@ bool PortNames::take_page(shm::SourceId id, const shm::FileDescriptor& page) {
   source->page = use_page(reopen_inherited(page, sizeof(shm::ActivityPage)));
   pages_->attach(id, &source->activity());
   announce(*source);
+  if (!is_stored) store_page(*source, source->page, source->page_number);
   return true;
 }
 
 bool PortNames::take_stored_page(const std::string& name, const shm::FileDescriptor& page) {
   const auto id = source_of_stored(name);
-  return id && take_page(*id, page);
+  return id && take_page(*id, page, true);
 }
 
 bool PortNames::has_lost_page(const Source& source) {
@@ -251,7 +252,7 @@ void PortNames::forget(Source& source) {
   news_.erase(source.news);
   pages_->attach(source.id, nullptr);
   source.name.clear();
-  source.page = {};
+  closed_.add(std::make_shared<Page>(std::exchange(source.page, {})));
   source.next = {};
   source.page_user.reset();
   source.promised_until = 0;
@@ -325,7 +326,12 @@ InputName& PortNames::unused_input() {
 
 Source& PortNames::source(const std::string& name, PageUser user) {
   if (const auto found = source_ids_.find(name); found != source_ids_.end()) {
-    return *sources_[found->second];
+    Source& known = *sources_[found->second];
+    if (!user) {  // what a model names costs nobody anything
+      shares_.make_own(known.charge);
+      shares_.make_own(known.page_charge);
+    }
+    return known;
   }
   Charge charge = take(user, Share::kSources);
   Charge page_charge = take(user, Share::kDescriptors, kDescriptorsOfPage);
@@ -355,7 +361,9 @@ Source& PortNames::source(const std::string& name, PageUser user) {
 
 InputName& PortNames::input(const std::string& name, PageUser user) {
   if (const auto found = input_ids_.find(name); found != input_ids_.end()) {
-    return *inputs_[found->second];
+    InputName& known = *inputs_[found->second];
+    if (!user) shares_.make_own(known.charge);
+    return known;
   }
   Charge charge = take(user, Share::kInputs);
   InputName& input = unused_input();
@@ -387,13 +395,6 @@ Source* PortNames::source_of(shm::PortInstance port) {
     return source->open == port || source->away == port;
   });
   return found == sources_.end() ? nullptr : found->get();
-}
-
-InputName* PortNames::input_of(shm::PortInstance port) {
-  const auto found = std::find_if(inputs_.begin(), inputs_.end(), [&](const auto& input) {
-    return input->open == port || input->away == port;
-  });
-  return found == inputs_.end() ? nullptr : found->get();
 }
 
 }  // namespace arbiter::service

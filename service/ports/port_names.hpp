@@ -19,6 +19,7 @@
 
 #include "service/kept/registry.hpp"
 #include "service/policy/shares.hpp"
+#include "service/ports/closed_ports.hpp"
 #include "service/ports/tables_in_use.hpp"
 #include "shm/activity.hpp"
 #include "shm/decision.hpp"
@@ -86,8 +87,9 @@ class PortNames {
   // Takes up what a predecessor has registered; pages come by take_page().
   void restore(const TablesInUse& tables);
   // One page that somebody hands back. False: it is not the page in force of that source.
-  // Throws std::runtime_error where it is none that a daemon of ours has made.
-  bool take_page(shm::SourceId id, const shm::FileDescriptor& page);
+  // Throws std::runtime_error where it is none that a daemon of ours has made. `is_stored`: the
+  // service manager has it.
+  bool take_page(shm::SourceId id, const shm::FileDescriptor& page, bool is_stored = false);
   // The same of one that the service manager has kept, under the name that it was given.
   bool take_stored_page(const std::string& name, const shm::FileDescriptor& page);
   // Of a source whose page nobody has, and whose publisher is gone: another page takes the place of
@@ -132,7 +134,6 @@ class PortNames {
   [[nodiscard]] InputName* input_by_id(shm::PortId id);
   // Who has, or had and may come back to, that port.
   [[nodiscard]] Source* source_of(shm::PortInstance port);
-  [[nodiscard]] InputName* input_of(shm::PortInstance port);
   [[nodiscard]] const std::vector<std::unique_ptr<Source>>& sources() const { return sources_; }
   [[nodiscard]] const std::vector<std::unique_ptr<InputName>>& inputs() const { return inputs_; }
   // Names and pages in the order in which they were made, or replaced, by a number that grows.
@@ -143,6 +144,8 @@ class PortNames {
   [[nodiscard]] const std::map<std::uint64_t, News>& news() const { return news_; }
   [[nodiscard]] std::uint64_t last_news() const { return last_news_; }
   [[nodiscard]] const shm::ActivityPages& pages() const { return *pages_; }
+  [[nodiscard]] ClosedPorts& closed() { return closed_; }
+  [[nodiscard]] const ClosedPorts& closed() const { return closed_; }
 
   // The generation in force, which says what is no longer used.
   void set_generation(std::uint64_t generation) {
@@ -188,6 +191,7 @@ class PortNames {
   std::uint64_t generation_ = 0;
   std::map<std::uint64_t, News> news_;
   std::uint64_t last_news_ = 0;
+  ClosedPorts closed_;
 };
 
 }  // namespace arbiter::service

@@ -64,21 +64,15 @@ void Switchboard::insert(std::unique_ptr<InputPort> port, Client& client, InputN
 }
 
 void Switchboard::remove(shm::PortInstance port) {
-  const bool is_output = outputs_.contains(port);
-  for (auto link = first_link(port); link != links_.end();) {
-    const auto [output, input] = link->first;
-    if (is_output && output != port) break;
-    if (output != port && input != port) {
-      ++link;
-      continue;
-    }
+  for (const LinkKey& key : links_of(port)) {
+    const auto [output, input] = key;
+    const Link link = take_link(key);
     const shm::PortInstance peer = output == port ? input : output;
-    if (input == port || link->second.is_mutual() || link->second.is_refused()) {
+    if (input == port || link.is_mutual() || link.is_refused()) {
       client_of(peer).send(message_to(wire::MessageKind::kPeerGone, peer, port));
     }
     // A publisher may have died between delivering and ringing.
     if (output == port) inputs_.at(peer)->bell->ring();
-    link = links_.erase(link);
   }
   end_claims_on(port);
   taps_.end(port);
@@ -95,16 +89,32 @@ void Switchboard::remove(shm::PortInstance port) {
   erase(port);
 }
 
-// Those of an output port stand together.
-Switchboard::LinkMap::iterator Switchboard::first_link(shm::PortInstance port) {
-  return outputs_.contains(port) ? links_.lower_bound({port, 0}) : links_.begin();
+std::vector<Switchboard::LinkKey> Switchboard::links_of(shm::PortInstance port) const {
+  std::vector<LinkKey> keys;
+  for (auto link = links_.lower_bound({port, 0}); link != links_.end() && link->first.first == port;
+       ++link) {
+    keys.push_back(link->first);
+  }
+  for (auto end = linked_.lower_bound({port, 0}); end != linked_.end() && end->first == port;
+       ++end) {
+    keys.emplace_back(end->second, port);
+  }
+  return keys;
+}
+
+Link& Switchboard::link_at(const LinkKey& key) {
+  linked_.emplace(key.second, key.first);
+  return links_[key];
+}
+
+Link Switchboard::take_link(const LinkKey& key) {
+  linked_.erase({key.second, key.first});
+  return std::move(links_.extract(key).mapped());
 }
 
 void Switchboard::erase(shm::PortInstance port) {
   ARBITER_ASSERT(outputs_.count(port) + inputs_.count(port) == 1, "a port is closed twice");
-  const auto link = links_.lower_bound({port, 0});
-  ARBITER_ASSERT(link == links_.end() || link->first.first != port,
-                 "a port has links when it is closed");
+  ARBITER_ASSERT(links_of(port).empty(), "a port has links when it is closed");
   for (const auto& [peer, claim] : claims_of(port)) claimed_.erase({peer, port});
   if (const auto found = outputs_.find(port); found != outputs_.end()) {
     ARBITER_ASSERT(found->second->source->open == port,
@@ -112,6 +122,8 @@ void Switchboard::erase(shm::PortInstance port) {
     found->second->source->open = 0;
     names_.let_go(*found->second->source);
     found->second->client->ports.erase(port);
+    found->second->charge = {};
+    names_.closed().add(std::move(found->second));
     outputs_.erase(found);
   }
   if (const auto found = inputs_.find(port); found != inputs_.end()) {
@@ -119,6 +131,8 @@ void Switchboard::erase(shm::PortInstance port) {
     found->second->name->open = 0;
     names_.let_go(*found->second->name);
     found->second->client->ports.erase(port);
+    found->second->charge = {};
+    names_.closed().add(std::move(found->second));
     inputs_.erase(found);
   }
 }
@@ -221,7 +235,7 @@ void Switchboard::make_links(const Wanted& wanted, Told& told) {
 // A mismatch leaves the two linked as if the input port only sensed the source, and both are told.
 void Switchboard::make_link(const OutputPort& output, const InputPort& input, LinkKind kind,
                             Told& told) {
-  Link& link = links_[{output.instance, input.instance}];
+  Link& link = link_at({output.instance, input.instance});
   link.kind = kind;
   link.mismatch =
       kind == LinkKind::kConnected

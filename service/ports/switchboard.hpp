@@ -63,8 +63,8 @@ class Switchboard {
   // Makes links of the port's claims and its peers' where they agree. `is_away`: whether a port may
   // still come back.
   void settle_claims(shm::PortInstance port, const std::function<bool(shm::PortInstance)>& is_away);
-  // A port that was away will not come back.
-  void forget_away(shm::PortInstance port);
+  // Ports that were away will not come back.
+  void forget_away(const KeptPorts& ports);
 
   // Sends the pages, and makes the links, that a table asks for: all of them, or those of one
   // port. Links that it does not ask for any more stay until unlink().
@@ -116,7 +116,6 @@ class Switchboard {
 
  private:
   using Wanted = std::map<LinkKey, LinkKind>;
-  using LinkMap = std::map<LinkKey, Link>;
   void want_links(const OutputPort& output, const shm::TableView& table, Wanted& wanted) const;
   void want_links(const InputPort& input, const shm::TableView& table, Wanted& wanted) const;
   void make_links(const Wanted& wanted, Told& told);
@@ -136,7 +135,10 @@ class Switchboard {
   void insert(std::unique_ptr<OutputPort> port, Client& client, Source& source);
   void insert(std::unique_ptr<InputPort> port, Client& client, InputName& name);
   void erase(shm::PortInstance port);
-  LinkMap::iterator first_link(shm::PortInstance port);
+  [[nodiscard]] std::vector<LinkKey> links_of(shm::PortInstance port) const;
+  // Made if need be.
+  Link& link_at(const LinkKey& key);
+  Link take_link(const LinkKey& key);
   void settle(OutputPort& output, InputPort& input);
   std::optional<std::uint64_t> take_claim(shm::PortInstance port, shm::PortInstance peer);
   [[nodiscard]] Claims& claims_of(shm::PortInstance port) const;
@@ -146,7 +148,9 @@ class Switchboard {
   Registry& registry_;
   std::map<shm::PortInstance, std::unique_ptr<OutputPort>> outputs_;
   std::map<shm::PortInstance, std::unique_ptr<InputPort>> inputs_;
-  LinkMap links_;
+  std::map<LinkKey, Link> links_;
+  // The same the other way round: input, output.
+  std::set<std::pair<shm::PortInstance, shm::PortInstance>> linked_;
   // Who claims a link with whom, the one that is claimed first: many ports may end at once, and
   // others wait meanwhile.
   std::set<std::pair<shm::PortInstance, shm::PortInstance>> claimed_;

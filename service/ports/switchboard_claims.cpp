@@ -14,23 +14,27 @@
 namespace arbiter::service {
 
 Charge Switchboard::set_away(shm::PortInstance port) {
-  const auto found = outputs_.find(port);
-  const bool is_output = found != outputs_.end();
-  for (auto link = first_link(port); link != links_.end();) {
-    const auto [output, input] = link->first;
-    if (is_output && output != port) break;
-    if (output == port && (link->second.is_mutual() || link->second.is_refused())) {
-      claim(input, port, {link->second.number});
-    }
-    if (input == port) claim(output, port, {link->second.number});
-    link = output == port || input == port ? links_.erase(link) : std::next(link);
+  for (const LinkKey& key : links_of(port)) {
+    const auto [output, input] = key;
+    const Link link = take_link(key);
+    const bool is_heard_of = link.is_mutual() || link.is_refused();
+    if (output == port && is_heard_of) claim(input, port, {link.number});
+    if (input == port) claim(output, port, {link.number});
   }
   taps_.set_away(port);
-  Source* const source = is_output ? found->second->source : nullptr;
-  InputName* const name = is_output ? nullptr : inputs_.at(port)->name;
-  Charge charge = std::move(is_output ? found->second->charge : inputs_.at(port)->charge);
+  const auto output = outputs_.find(port);
+  if (output != outputs_.end()) {
+    Charge charge = std::move(output->second->charge);
+    Source& source = *output->second->source;
+    erase(port);
+    source.away = port;
+    return charge;
+  }
+  InputPort& input = *inputs_.at(port);
+  Charge charge = std::move(input.charge);
+  InputName& name = *input.name;
   erase(port);
-  (is_output ? source->away : name->away) = port;
+  name.away = port;
   return charge;
 }
 
@@ -96,7 +100,7 @@ void Switchboard::settle(OutputPort& output, InputPort& input) {
   const auto by_output = take_claim(output.instance, input.instance);
   const auto by_input = take_claim(input.instance, output.instance);
   if (by_output && by_input && *by_output == *by_input && *by_output != 0) {
-    links_[{output.instance, input.instance}] = {LinkKind::kConnected, *by_output, ""};
+    link_at({output.instance, input.instance}) = {LinkKind::kConnected, *by_output, ""};
     return;
   }
   if (by_output.value_or(0) != 0) {
@@ -108,7 +112,7 @@ void Switchboard::settle(OutputPort& output, InputPort& input) {
         message_to(wire::MessageKind::kDisconnected, input.instance, output.instance));
   }
   // The publisher knows the port, and heeds what it holds.
-  if (by_output) links_[{output.instance, input.instance}] = {LinkKind::kLapsed, 0, ""};
+  if (by_output) link_at({output.instance, input.instance}) = {LinkKind::kLapsed, 0, ""};
 }
 
 void Switchboard::end_claims_on(shm::PortInstance port) {
@@ -123,15 +127,20 @@ void Switchboard::end_claims_on(shm::PortInstance port) {
   }
 }
 
-void Switchboard::forget_away(shm::PortInstance port) {
-  end_claims_on(port);
-  taps_.end(port);
-  if (Source* source = names_.source_of(port)) {
+void Switchboard::forget_away(const KeptPorts& ports) {
+  if (ports.empty()) return;
+  for (const auto& source : names_.sources()) {
+    if (source->away == 0 || !ports.contains(source->away)) continue;
+    end_claims_on(source->away);
+    taps_.end(source->away);
     source->away = 0;
     names_.let_go(*source);
     registry_.source(source->id).clear_owner();
-  } else if (InputName* name = names_.input_of(port)) {
-    taps_.end(port, name->name);
+  }
+  for (const auto& name : names_.inputs()) {
+    if (name->away == 0 || !ports.contains(name->away)) continue;
+    end_claims_on(name->away);
+    taps_.end(name->away, name->name);
     name->away = 0;
     names_.let_go(*name);
     registry_.input(name->id).clear_owner();

@@ -52,6 +52,7 @@ void Takeover::take_back(Client& client, const wire::Received& hello) {
       throw std::runtime_error("this daemon's predecessor had other memory");
     }
     inherit(hello.descriptors[0], hello.descriptors[1]);
+    store_realm();
   } else if (!(shm::identity_of(hello.descriptors[0]) == shm::identity_of(board_.readable()))) {
     throw std::runtime_error("this daemon does not know the ports of \"" + client.name +
                              "\", which another daemon has opened; restart the component");
@@ -95,8 +96,10 @@ bool Takeover::is_that(const Client& client, const Absentee& absentee) {
 void Takeover::take_back_page(Client& client, const wire::Received& received) {
   const shm::SourceId id = received.message.id;
   const Source* source = names_.source_by_id(id);
-  // One that was to come into force next when the last daemon ended.
-  if (source != nullptr && received.message.value == source->page_number + 1) return;
+  const std::uint32_t number = received.message.value;
+  // Its name is nobody's any more; or it was to come into force next when the last daemon ended.
+  const bool is_known = source != nullptr && !source->name.empty();
+  if (number != 0 && (!is_known || number == source->page_number + 1)) return;
   if (!names_.take_page(id, received.descriptors[0])) {
     throw std::runtime_error("what was handed back is not the page of source " +
                              std::to_string(id));
@@ -165,9 +168,7 @@ void Takeover::finish_return(Client& client) {
   }
   client.is_returning = false;
   client.why_not_returned.clear();
-  for (const auto& [port, charge] : std::exchange(client.to_hand_back, {})) {
-    switchboard_.forget_away(port);  // closed meanwhile
-  }
+  switchboard_.forget_away(std::exchange(client.to_hand_back, {}));  // closed meanwhile
   std::set<shm::PortInstance> away;
   for (const auto& source : names_.sources()) away.insert(source->away);
   for (const auto& input : names_.inputs()) away.insert(input->away);
@@ -229,7 +230,7 @@ void Takeover::forget_absentee(NodeId node) {
 void Takeover::give_up(NodeId node) {
   const Absentee absentee = std::move(absentees_.at(node));
   absentees_.erase(node);
-  for (const auto& [port, charge] : absentee.ports) switchboard_.forget_away(port);
+  switchboard_.forget_away(absentee.ports);
   if (is_over()) replace_lost_pages();
   host_.try_postponed();
 }

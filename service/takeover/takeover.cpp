@@ -134,24 +134,23 @@ void Takeover::inherit(const shm::FileDescriptor& board, const shm::FileDescript
 }
 
 void Takeover::find_absentees() {
+  KeptPorts ended;
   for (const auto& source : names_.sources()) {
-    if (source->away != 0) add_absentee(registry_.source(source->id).owner());
+    if (source->away != 0) add_absentee(registry_.source(source->id).owner(), ended);
   }
   for (const auto& input : names_.inputs()) {
-    if (input->away != 0) add_absentee(registry_.input(input->id).owner());
+    if (input->away != 0) add_absentee(registry_.input(input->id).owner(), ended);
   }
+  switchboard_.forget_away(ended);
   for (const auto& source : names_.sources()) {
-    if (source->away != 0) charge_away(*source, registry_.source(source->id).owner());
+    if (source->page_user) charge(*source->page_user, *source);
   }
   for (const auto& input : names_.inputs()) {
-    if (input->away != 0) charge_away(*input, registry_.input(input->id).owner());
+    if (input->away == 0) continue;
+    const auto absentee = absentees_.find(registry_.input(input->id).owner().node);
+    if (absentee == absentees_.end() || !absentee->second.user) continue;
+    charge(*absentee->second.user, *input);
   }
-}
-
-template <class Name>
-void Takeover::charge_away(Name& name, const Owner& owner) {
-  const Absentee& absentee = absentees_.at(owner.node);
-  if (absentee.user) charge(*absentee.user, name);
 }
 
 void Takeover::charge(uid_t user, Source& source) {
@@ -172,7 +171,7 @@ Charge Takeover::charge_of_port(uid_t user, Charge kept, std::uint64_t descripto
   return kept;
 }
 
-void Takeover::add_absentee(const Owner& owner) {
+void Takeover::add_absentee(const Owner& owner, KeptPorts& ended) {
   const auto [found, is_new] = absentees_.try_emplace(owner.node);
   Absentee& absentee = found->second;
   if (is_new) {
@@ -181,7 +180,7 @@ void Takeover::add_absentee(const Owner& owner) {
     absentee.user = user_of_process(owner.process.pid);
     if (!open_and_watch(owner.node, absentee)) {
       absentees_.erase(owner.node);
-      switchboard_.forget_away(owner.port);
+      ended.try_emplace(owner.port);
       return;
     }
     // As it had it of the last daemon, whatever is left by now.
@@ -228,18 +227,7 @@ void Takeover::finish() {
     if (phase_ == Phase::kExpecting) {
       log::warn("no component has handed back what the last daemon left");
     }
-    if (stores_) {
-      discard_stored("board");
-      at_step("store-half-emptied");
-      discard_stored("registry");
-      // Or the next daemon would give up new pages with old ones of the same names.
-      for (const std::string& page : std::exchange(stored_, {})) discard_stored(page);
-      at_step("store-emptied");
-      store("board", board_.writable());
-      at_step("board-stored");
-      store("registry", registry_.writable());
-      at_step("registry-stored");
-    }
+    store_realm();
   }
   phase_ = Phase::kServing;
   host_.try_postponed();
@@ -247,6 +235,21 @@ void Takeover::finish() {
   names_.forget_lost_pages(board_.in_force().table);
   at_step("about-to-serve");
   host_.begin_to_serve(is_fresh);
+}
+
+// In the place of another, where there is one: pages are stored as they are made or handed back.
+void Takeover::store_realm() {
+  if (!stores_) return;
+  discard_stored("board");
+  at_step("store-half-emptied");
+  discard_stored("registry");
+  // Or the next daemon would give up new pages with old ones of the same names.
+  for (const std::string& page : std::exchange(stored_, {})) discard_stored(page);
+  at_step("store-emptied");
+  store("board", board_.writable());
+  at_step("board-stored");
+  store("registry", registry_.writable());
+  at_step("registry-stored");
 }
 
 // The table in force goes on, perhaps for good: what it names by an id must stay what it was.

@@ -142,9 +142,11 @@ class Takeover {
 
   [[nodiscard]] bool inherit_stored();
   void take_stored_page(const StoredDescriptor& stored);
+  void store_realm();
   void inherit(const shm::FileDescriptor& board, const shm::FileDescriptor& registry);
   void find_absentees();
-  void add_absentee(const Owner& owner);
+  // `ended`: to those is added what need not be kept.
+  void add_absentee(const Owner& owner, KeptPorts& ended);
   // Names that are taken up are the daemon's own at first. Then they count as their user's, and so
   // do ports that come back, but for what the components that are away need to come back by.
   void charge(uid_t user, Source& source);
@@ -154,8 +156,6 @@ class Takeover {
   [[nodiscard]] std::uint64_t left_for_absentees() const {
     return Client::kDescriptors * absentees_.size();
   }
-  template <class Name>
-  void charge_away(Name& name, const Owner& owner);
   // False: it has ended.
   [[nodiscard]] bool open_and_watch(NodeId node, Absentee& absentee);
   void watch_unwatched();

@@ -16,6 +16,7 @@
 #include "tests/support/await.hpp"
 #include "tests/support/daemon.hpp"
 #include "tests/support/error_of.hpp"
+#include "tests/support/raw_port.hpp"
 #include "wire/call.hpp"
 
 namespace arbiter::test {
@@ -78,6 +79,23 @@ TEST(Deaths, AreNotThoseOfComponentsThatCloseAllBeforeTheyEnd) {
   daemon.process().signal(SIGCONT);
   await([&] { return daemon.status()["clients"] == 1; });
   EXPECT_TRUE(daemon.status()["deaths"].empty()) << daemon.log();
+}
+
+// Another has asked for the name before, and is served first.
+TEST(Deaths, AreNotThoseOfComponentsWhoseNamesAreAskedForAsTheyEnd) {
+  Daemon daemon(single_model());
+  Component component("component");
+  ASSERT_EQ(component.tell("output /out"), "open");
+  RawClient asking(daemon.instance());
+  asking.hello("asking");
+  const auto segment = raw_output_segment();
+  daemon.process().stop();
+  asking.send(RawClient::message(wire::MessageKind::kOpenOutput, "/out"), {segment.get(), -1});
+  EXPECT_EQ(component.end(), 0);
+  daemon.process().signal(SIGCONT);
+  asking.expect(wire::MessageKind::kConnected);
+  EXPECT_TRUE(daemon.status()["deaths"].empty()) << daemon.log();
+  EXPECT_THAT(daemon.log(), HasSubstr("closed output port /out"));
 }
 
 // Its process lives, so the next daemon would keep its ports for it.

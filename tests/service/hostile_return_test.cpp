@@ -215,7 +215,15 @@ TEST(HostileReturn, WithWhatTheDaemonHasNoDescriptorForCostsNobodyItsPort) {
   const auto hand_back = [&](RawClient& poor) {
     poor.send(output, {segment.get(), opened.descriptors[0].get()});
   };
-  for (const int many : {32, 24}) {  // fewer, for the limit cannot be raised again
+  struct Round {
+    int many;     // fewer each time, for the limit cannot be raised again
+    rlim_t left;  // descriptors, in which the message comes and nothing else
+    const char* why;
+  };
+  const std::string refusal = "no descriptor left";
+  for (const auto& [many, left, why] :
+       {Round{32, 0, refusal.c_str()}, Round{24, 0, refusal.c_str()},
+        Round{16, 2, "Too many open files"}}) {
     RawClient memory = come_back();  // from here on the daemon serves
     const pid_t process = daemon.process().pid();
     const std::string descriptors = "/proc/" + std::to_string(process) + "/fd/";
@@ -238,10 +246,10 @@ TEST(HostileReturn, WithWhatTheDaemonHasNoDescriptorForCostsNobodyItsPort) {
     for (int i = 0; i < 4; ++i) connect();  // in place of the conversation that this has ended
     wait_until_all_rest(process);           // it neither closes any, nor sets its limit itself
     const rlim_t used = first_free();
-    const rlimit none{used, used};  // where it receives, it raises the soft one
-    ASSERT_EQ(::prlimit(process, RLIMIT_NOFILE, &none, nullptr), 0);
+    const rlimit few{used + left, used + left};  // where it receives, it raises the soft one
+    ASSERT_EQ(::prlimit(process, RLIMIT_NOFILE, &few, nullptr), 0);
     hand_back(poor);
-    EXPECT_THAT(poor.expect_refusal(), testing::HasSubstr("no descriptor left"));
+    EXPECT_THAT(poor.expect_refusal(), testing::HasSubstr(why));
     others.clear();
     await([&] { return count() <= before + 2; });  // those of the one that is left
     poor.send(RawClient::message(MessageKind::kHandedBack));
@@ -258,7 +266,6 @@ TEST(HostileReturn, WithWhatTheDaemonHasNoDescriptorForCostsNobodyItsPort) {
   await([&] { return daemon.source("/out")["open"] == true; });
   // A component comes again twenty times a second: the log has it once, and when it is over.
   const std::string log = daemon.log();
-  const std::string refusal = "no descriptor left";
   const auto said = log.find(refusal);
   ASSERT_NE(said, std::string::npos) << log;
   EXPECT_EQ(log.find(refusal, said + 1), std::string::npos) << log;

@@ -9,6 +9,8 @@
 #include <string>
 #include <vector>
 
+#include "shm/activity.hpp"
+#include "shm/segment.hpp"
 #include "tests/client/models.hpp"
 #include "tests/support/await.hpp"
 #include "tests/support/daemon.hpp"
@@ -18,6 +20,7 @@ namespace arbiter::test {
 namespace {
 
 using testing::HasSubstr;
+using testing::Not;
 using wire::MessageKind;
 
 // A component with many ports, of which none is ever closed, and which comes back.
@@ -51,10 +54,25 @@ class Owning {
     }
   }
   void hang_up() { client_.hang_up(); }
-  // With the output ports.
+  nlohmann::json status() { return client_.status(); }
+  // All output ports, whose activity goes on.
+  void close_active() { close_all(shm::kForeverFlag); }
+  void close_inactive() { close_all(shm::kNeverActive); }
+  [[nodiscard]] std::vector<std::string> names() const {
+    std::vector<std::string> names;
+    for (int i = 1; i <= named_; ++i) names.push_back(name(i));
+    return names;
+  }
+  // With the output ports, and the pages of those that it has closed.
   void come_back() {
     come_in(wire::kComesBack | wire::kRejoins,
             {welcome_.descriptors[0].get(), welcome_.descriptors[1].get()});
+    for (const wire::Received& opened : left_) {
+      auto page = RawClient::message(MessageKind::kHandBackPage);
+      page.id = opened.message.id;
+      page.value = 1;
+      client_.send(page, {opened.descriptors[0].get(), -1});
+    }
     for (const wire::Received& opened : outputs_) {
       auto output = RawClient::message(MessageKind::kHandBackOutput);
       output.port = opened.message.port;
@@ -78,8 +96,19 @@ class Owning {
     });
     return welcome;
   }
-  std::string next_name() {
-    return "/" + std::to_string(welcome_.message.link) + "/" + std::to_string(++named_);
+  void close_all(shm::ActivityWord left) {
+    for (wire::Received& opened : outputs_) {
+      const shm::Mapping page(opened.descriptors[0], sizeof(shm::ActivityPage),
+                              shm::Access::kReadWrite);
+      page.as<shm::ActivityPage>()->of(opened.message.id).word = left;
+      close_raw(client_, opened.message.port);
+      left_.push_back(std::move(opened));
+    }
+    outputs_.clear();
+  }
+  std::string next_name() { return name(++named_); }
+  [[nodiscard]] std::string name(int number) const {
+    return "/" + std::to_string(welcome_.message.link) + "/" + std::to_string(number);
   }
 
   const Daemon& daemon_;
@@ -87,6 +116,7 @@ class Owning {
   wire::Received welcome_;
   shm::FileDescriptor output_ = raw_output_segment();
   std::vector<wire::Received> outputs_;
+  std::vector<wire::Received> left_;
   int named_ = 0;
 };
 
@@ -128,6 +158,47 @@ TEST(ReturnedPorts, CountAsTheirUsersUnderAnotherDaemon) {
     EXPECT_THAT(owning.open_all(), HasSubstr("limit-exceeded"));
     EXPECT_EQ(owning.ports(), ports);
   }
+}
+
+TEST(ReturnedPorts, CountAsTheirUsersThoughOnlyTheirActivityIsLeft) {
+  Daemon daemon(kNoRules, {.max_descriptors = 300});
+  Owning owning(daemon);
+  owning.open_all();
+  const std::size_t ports = owning.ports();
+  owning.close_active();
+  daemon.kill();
+  daemon.restart();
+  owning.come_back();
+  EXPECT_THAT(owning.open_all(), HasSubstr("limit-exceeded"));
+  EXPECT_LT(owning.ports(), ports / 2);
+}
+
+// As the refusal advises.
+TEST(ReturnedPorts, CountNoLongerAsTheirUsersOnceAModelNamesThem) {
+  Daemon daemon(kNoRules, {.max_descriptors = 300});
+  Owning owning(daemon);
+  EXPECT_THAT(owning.open_all(), HasSubstr("limit-exceeded"));
+  const std::size_t ports = owning.ports();
+  std::string body;
+  for (const std::string& name : owning.names()) body += arbiter_at("/in" + name, select(name));
+  daemon.write_model(rules(body));
+  daemon.hang_up();
+  await([&] { return owning.status()["model"]["generation"] == 2; });
+  EXPECT_THAT(owning.open_all(), HasSubstr("limit-exceeded"));
+  EXPECT_GT(owning.ports(), ports + 3);
+}
+
+// The daemon has forgotten the name, and the component has its page yet.
+TEST(ReturnedPorts, WithPagesOfNamesThatAreNobodysAreNotRefused) {
+  Daemon daemon;
+  Owning owning(daemon);
+  owning.open_one();
+  owning.close_inactive();
+  owning.open_one();
+  daemon.kill();
+  daemon.restart();
+  owning.come_back();
+  EXPECT_THAT(daemon.log(), Not(HasSubstr("handed back is not the page")));
 }
 
 // A name that only a daemon before the last has known is nobody's.

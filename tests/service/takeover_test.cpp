@@ -277,5 +277,29 @@ TEST(Takeover, ByADescriptorStoreThatIsOfNoUseEmptiesIt) {
   EXPECT_EQ(names, (std::vector<std::string>{"board", "page-0-1", "registry"})) << daemon.log();
 }
 
+// The service was stopped and started again: nothing was left in the store.
+TEST(Takeover, ByComponentsStoresWhatTheyHandBack) {
+  Daemon::Options options;
+  options.arguments = {"--descriptor-store"};
+  Daemon daemon(override_model(), options);
+  Component last("last");
+  ASSERT_EQ(last.tell("output /stop"), "open");
+  last.tell("signal /stop");
+  daemon.terminate();
+  std::vector<std::string> names;
+  for (const auto& [name, descriptor] : daemon.notify().stored()) names.push_back(name);
+  {
+    const ScopedVariable notify("NOTIFY_SOCKET", daemon.notify().path());
+    for (const std::string& name : names) service::discard_stored(name);
+  }
+  ASSERT_TRUE(daemon.notify().stored().empty());
+  daemon.restart();
+  await([&] { return daemon.source("/stop")["open"] == true; });
+  last.end();
+  daemon.kill();
+  daemon.restart_with_stored();
+  EXPECT_TRUE(daemon.source("/stop")["active"]) << daemon.log();
+}
+
 }  // namespace
 }  // namespace arbiter::test
