@@ -9,6 +9,8 @@
 #include <unistd.h>
 
 #include <csignal>
+#include <filesystem>
+#include <iterator>
 #include <sstream>
 #include <thread>
 
@@ -109,6 +111,22 @@ TEST(LogWriter, ALogThatNobodyReadsHoldsNobodyUpAndSaysWhatItLost) {
   const std::size_t enough = (LogWriter::kMaxWaiting + (1 << 20)) / line.size();
   for (std::size_t i = 0; i < enough; ++i) writer.put(line);  // would block here
   EXPECT_FALSE(writer.finish(0ms));
+}
+
+// It would write what comes behind before what the first is still writing.
+TEST(LogWriter, ThereIsNoSecondThreadOnceTheFirstWasLeft) {
+  Pipe pipe;
+  LogWriter writer(pipe.write.get());
+  const std::string line(4096, 'x');
+  for (std::size_t i = 0; i < LogWriter::kMaxWaiting / line.size(); ++i) writer.put(line);
+  EXPECT_FALSE(writer.finish(0ms));
+  const auto threads = [] {
+    const std::filesystem::directory_iterator all("/proc/self/task");
+    return std::distance(begin(all), end(all));
+  };
+  const auto before = threads();
+  EXPECT_FALSE(writer.finish(0ms));
+  EXPECT_EQ(threads(), before);
 }
 
 TEST(LogWriter, LinesThatWereLostAreCountedWhereTheyWouldHaveStood) {
