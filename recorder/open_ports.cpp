@@ -8,7 +8,8 @@ namespace arbiter::recorder {
 
 using evidence::PortChange;
 
-OpenPorts::Ports OpenPorts::ports_of(const wire::Status& status) {
+// With those whose component has not come back to this daemon yet: they are as they were.
+OpenPorts::Ports OpenPorts::ports_of(const wire::Status& status) const {
   Ports ports;
   const auto note = [&](bool is_input, const std::string& name, const auto& open) {
     PortChange& port = ports[{is_input, name}];
@@ -18,14 +19,21 @@ OpenPorts::Ports OpenPorts::ports_of(const wire::Status& status) {
     port.pid = open.component.pid;
     if (open.type) port.type = open.type->name;
   };
+  const auto note_away = [&](bool is_input, const auto& away) {
+    const auto known = ports_.find({is_input, away.name});
+    if (known != ports_.end() && known->second.pid == away.away_pid) ports.insert(*known);
+  };
   for (const auto& source : status.sources) {
-    if (!source.open) continue;
+    if (!source.open) {
+      note_away(false, source);
+      continue;
+    }
     note(false, source.name, *source.open);
     const std::string host = watch::host_of(source);
     if (host != watch::kUnknownHost) ports[{false, source.name}].host = host;
   }
   for (const auto& input : status.inputs) {
-    if (input.open) note(true, input.name, *input.open);
+    input.open ? note(true, input.name, *input.open) : note_away(true, input);
   }
   return ports;
 }

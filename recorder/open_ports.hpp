@@ -26,7 +26,7 @@ class OpenPorts {
  private:
   using Ports = std::map<std::pair<bool, std::string>, evidence::PortChange>;
 
-  [[nodiscard]] static Ports ports_of(const wire::Status& status);
+  [[nodiscard]] Ports ports_of(const wire::Status& status) const;
   void note_deaths(const std::vector<wire::DeathStatus>& deaths, Batch& batch);
 
   Ports ports_;

@@ -22,7 +22,7 @@ Recorder::Recorder(const RecorderOptions& options, Sink& sink)
       failed_(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)),
       pipeline_(queue_, sink, [this] { eventfd_write(failed_.get(), 1); }),
       started_(shm::monotonic_now()) {
-  take_new_taps();
+  static_cast<void>(take_new_taps());
   watcher_.start();
 }
 
@@ -44,22 +44,27 @@ void Recorder::run(Nanoseconds end, int events, const std::function<bool()>& goe
   poll_taps();
 }
 
-void Recorder::take_new_taps() {
-  Watcher::NewTaps fresh = watcher_.take_taps();
-  if (fresh.is_start) forget_taps();
+std::vector<std::shared_ptr<TapReader>> Recorder::take_new_taps() {
+  Watcher::NewTaps fresh = watcher_.take_taps([this] { forget_taps(); });
   for (auto& tap : fresh.taps) taps_.push_back(std::move(tap));
+  return std::move(fresh.over);
 }
 
 // What happened before the last round began has come with this one, but for publishers that were
 // stopped in between.
 void Recorder::poll_taps() {
-  take_new_taps();
+  const auto over = take_new_taps();
   const Nanoseconds now = shm::monotonic_now();
   Backlog backlog{queue_.waiting(), options_.queue_bytes};
   Batch batch;
   bool ports_changed = false;
   for (const auto& tap : taps_) {
     ports_changed = tap->poll(backlog, batch.records) || ports_changed;
+  }
+  for (const auto& tap : over) {
+    tap->finish(batch.records);
+    count(*tap);
+    std::erase(taps_, tap);
   }
   if (ports_changed) watcher_.note_ports_changed();
   batch.horizon = std::exchange(last_poll_, now);

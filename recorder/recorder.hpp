@@ -48,7 +48,8 @@ class Recorder {
 
  private:
   void poll_taps();
-  void take_new_taps();
+  // Returns those that are to be forgotten once they have been read.
+  std::vector<std::shared_ptr<TapReader>> take_new_taps();
   void forget_taps();
   void count(const TapReader& tap);
 

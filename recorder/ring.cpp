@@ -9,6 +9,7 @@
 
 #include "recording/directory.hpp"
 #include "shm/clock.hpp"
+#include "shm/limits.hpp"
 
 namespace arbiter::recorder {
 namespace {
@@ -150,6 +151,7 @@ void Ring::sum_up(const Record& record) {
   const auto note = [this](SourceState state) {
     base_time_ = std::max(base_time_, state.seen);
     sources_.insert_or_assign(state.context->source, std::move(state));
+    if (sources_.size() > shm::kMaxSources) forget_sources();
   };
   if (const auto* start = std::get_if<evidence::Start>(&record)) {
     start_ = *start;
@@ -197,6 +199,16 @@ void Ring::sum_up(const Record& record) {
         missed->why == Missed::Why::refused || missed->why == Missed::Why::stranger;
     if (is_untapped) untapped_[{missed->source, missed->why}] = *missed;
   }
+}
+
+// More than there can be at a time: names have come and gone. Those that the model does not read,
+// and that are not active, are not needed to begin with.
+void Ring::forget_sources() {
+  const auto* const rules = model_ ? model_->table.get() : nullptr;
+  std::erase_if(sources_, [&](const auto& each) {
+    const bool is_read = rules != nullptr && rules->source(each.first) != shm::kNone;
+    return !is_read && !shm::is_active(each.second.word, base_time_);
+  });
 }
 
 void Ring::finish(Nanoseconds horizon) {

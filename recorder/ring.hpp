@@ -82,6 +82,7 @@ class Ring : public Sink {
   void forget_oldest();
   void drop_oldest_payload();
   void sum_up(const Record& record);
+  void forget_sources();
   struct Request {
     std::uint64_t number = 0;
     Cause cause = Cause::asked;

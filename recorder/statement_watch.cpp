@@ -1,7 +1,9 @@
 #include "recorder/statement_watch.hpp"
 
 #include <chrono>
+#include <cstdint>
 #include <exception>
+#include <memory>
 #include <string>
 #include <utility>
 
@@ -11,6 +13,19 @@ namespace arbiter::recorder {
 namespace {
 
 constexpr std::chrono::milliseconds kLookEvery{2};
+
+// For as long as it is the same, so is what the daemon says.
+struct Moment {
+  std::shared_ptr<const shm::DecisionMemory> memory{};
+  std::uint64_t generation = 0;
+  std::uint64_t daemons = 0;
+
+  bool operator==(const Moment&) const = default;
+};
+
+Moment moment_of(const watch::Instance& instance) {
+  return {instance.memory(), instance.memory()->tables().generation(), instance.daemons()};
+}
 
 // With what is wrong in the statement: which name this model lacks.
 std::string reason_of(const watch::StatementError& error) {
@@ -41,12 +56,15 @@ StatementWatch::~StatementWatch() {
   thread_.join();
 }
 
-// What is not known is not true; nor does it count as having become false.
+// What is not known is not true; nor does it count as having become false. Of a model that gives it
+// no meaning, the daemon is asked once.
 void StatementWatch::run() {
   watch::LiveStatement statement(instance_, statement_);
   bool was_true = false;
   std::string reason;
-  const auto say_once = [&](const std::string& why) {
+  Moment meaningless;
+  const auto say_once = [&](const std::string& why, Moment moment) {
+    meaningless = std::move(moment);
     if (std::exchange(reason, why) != why) say_(why);
   };
   for (;;) {
@@ -54,17 +72,20 @@ void StatementWatch::run() {
       std::unique_lock lock(mutex_);
       if (stopping_.wait_for(lock, kLookEvery, [this] { return is_stopping_; })) return;
     }
+    Moment moment;
     try {
       instance_->update();
+      moment = moment_of(*instance_);
+      if (moment == meaningless) continue;
       const rules::Truth truth = statement.look().truth;
       if (truth == rules::Truth::kUnknown) continue;
       const bool is_true = truth == rules::Truth::kTrue;
       if (is_true && !was_true) came_true_();
       was_true = is_true;
     } catch (const watch::StatementError& error) {  // another model may have its names
-      say_once(reason_of(error) + "; --when waits for a model that has it");
-    } catch (const std::exception& error) {  // there is no daemon
-      say_once(error.what());
+      say_once(reason_of(error) + "; --when waits for a model that has it", std::move(moment));
+    } catch (const std::exception& error) {  // there is no model, or the daemon may not be asked
+      say_once(error.what(), std::move(moment));
     }
   }
 }

@@ -34,6 +34,7 @@ ActivityWord word_of(const TapEvent<>& event) {
 bool is_same(const SourceContext& context, const TapEvent<>& event,
              const std::vector<TapDestination>& destinations) {
   return context.type == event.type().name() && context.size == event.type().size() &&
+         context.alignment == event.type().alignment() &&
          std::equal(context.destinations.begin(), context.destinations.end(), destinations.begin(),
                     destinations.end(), [](const std::string& name, const TapDestination& each) {
                       return name == each.port;

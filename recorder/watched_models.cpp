@@ -37,8 +37,8 @@ void Watcher::take_up_model() {
     Batch batch;
     batch.add(model_change(model));
     tap_newcomers(chosen_sources(model), batch);
-    queue_.push(std::move(batch));
-    hand_over_taps(false);
+    push(std::move(batch));
+    hand_over_taps();
     return;
   }
 }
@@ -51,23 +51,22 @@ bool Watcher::is_chosen(const std::string& port) const {
 
 // All that the chosen ports are connected to or read: under the model in force, and under those
 // that may be switched to.
-std::set<std::string> Watcher::chosen_sources(const watch::ModelInForce& model) const {
-  std::set<std::string> chosen;
+std::set<std::string> Watcher::chosen_sources(const watch::ModelInForce& model) {
+  named_.clear();
   const auto snapshot = memory_->tables().snapshot();
   const auto add_source = [&](shm::SourceId id) {
-    if (memory_->pages().knows(id)) chosen.insert(memory_->source_name(id));
+    if (memory_->pages().knows(id)) named_.insert(memory_->source_name(id));
   };
-  if (options_.ports.empty()) {
-    for (shm::SourceId id = 0; id < shm::kMaxSources; ++id) add_source(id);
-  }
   for (const auto& [id, name] : instance_->port_names()) {
     if (is_chosen(name)) shm::for_each_heeded(snapshot.table, id, add_source);
   }
   for (const auto& other : model.others()) {
     for (const auto& [port, sources] : other.ports) {
-      if (is_chosen(port)) chosen.insert(sources.begin(), sources.end());
+      if (is_chosen(port)) named_.insert(sources.begin(), sources.end());
     }
   }
+  std::set<std::string> chosen = named_;
+  if (options_.ports.empty()) add_known_sources(chosen);
   return chosen;
 }
 

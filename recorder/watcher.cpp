@@ -1,5 +1,8 @@
 #include "recorder/watcher.hpp"
 
+#include <fcntl.h>
+#include <sys/resource.h>
+
 #include <algorithm>
 #include <exception>
 #include <utility>
@@ -7,6 +10,7 @@
 #include "rules/model/quantifiers.hpp"
 #include "rules/text/names.hpp"
 #include "shm/clock.hpp"
+#include "shm/descriptor_limit.hpp"
 #include "shm/picture.hpp"
 
 namespace arbiter::recorder {
@@ -17,14 +21,14 @@ using evidence::SourceContext;
 using evidence::SourceState;
 
 constexpr std::chrono::milliseconds kLookAtPagesEvery{10};
-// How often the daemon is asked for its ports: where a tap has told that they have changed, and
-// otherwise, for input ports that no tap tells of.
-constexpr Nanoseconds kPortsAtMostEvery = 200'000'000;
-constexpr Nanoseconds kPortsAtLeastEvery = 2'000'000'000;
 // A source that could not be tapped is tried again, less and less often: there may be room now, or
 // a daemon.
 constexpr Nanoseconds kTryAgainAfter = 1'000'000'000;
 constexpr Nanoseconds kTryAgainAtLeastEvery = 32'000'000'000;
+// Some four for each source that an instance can have. A few are for the files that are written,
+// and for those who ask for them.
+constexpr rlim_t kMostDescriptors = 65'536;
+constexpr rlim_t kSpareDescriptors = 32;
 // Until it has begun again, nothing is recorded.
 constexpr Nanoseconds kBeginAgainAfter = 20'000'000;
 constexpr Nanoseconds kBeginAtLeastEvery = 2'000'000'000;
@@ -37,10 +41,21 @@ ActivityWord believable(ActivityWord word, Nanoseconds now) {
   return flag | std::min(word & ~flag, now);
 }
 
+// The lowest number that is free is taken first: where this one is taken, nearly all are.
+void require_descriptors() {
+  rlimit limit{};
+  const bool has_some = ::getrlimit(RLIMIT_NOFILE, &limit) == 0 &&
+                        limit.rlim_cur > kSpareDescriptors &&
+                        ::fcntl(static_cast<int>(limit.rlim_cur - kSpareDescriptors), F_GETFD) < 0;
+  if (has_some) return;
+  throw Error("no descriptors are left for more taps: raise the limit (ulimit -n, LimitNOFILE=)");
+}
+
 }  // namespace
 
 Watcher::Watcher(const RecorderOptions& options, RecordQueue& queue)
     : options_(options), queue_(queue) {
+  shm::raise_descriptor_limit(kMostDescriptors);
   instance_ = std::make_unique<watch::Instance>(options_.caller);
   begin();
 }
@@ -58,9 +73,21 @@ void Watcher::stop() {
   if (thread_.joinable()) thread_.join();
 }
 
-Watcher::NewTaps Watcher::take_taps() {
+Watcher::NewTaps Watcher::take_taps(const std::function<void()>& forget_all) {
   const std::lock_guard lock(mutex_);
+  if (!to_start_.empty()) forget_all();
+  for (Batch& batch : std::exchange(to_start_, {})) queue_.push(std::move(batch));
   return std::exchange(new_taps_, {});
+}
+
+// Behind a start that waits.
+void Watcher::push(Batch&& batch) {
+  const std::lock_guard lock(mutex_);
+  if (to_start_.empty()) {
+    queue_.push(std::move(batch));
+  } else {
+    to_start_.push_back(std::move(batch));
+  }
 }
 
 void Watcher::run() {
@@ -91,11 +118,10 @@ void Watcher::look() {
     begin_again();
     return;
   }
-  if (memory_->tables().generation() != generation_) take_up_model();
+  look_at_pages();  // first: the daemon may be silent
+  ask_daemon();
   if (options_.ports.empty()) look_for_newcomers();
-  look_at_pages();
   try_refused();
-  look_at_ports();
 }
 
 // Where that fails, because the new daemon is busy with others, say, it is tried again.
@@ -125,11 +151,14 @@ void Watcher::begin() {
   node_.reset();
   node_.emplace(options_.caller.name, options_.node);
   sources_.clear();
+  gone_.clear();
   strangers_.clear();
   pages_of_newcomers_ = pages_of_ids_ = 0;
   begun_ = shm::monotonic_now();
   ports_ = OpenPorts(begun_);
   refusals_.clear();
+  may_not_observe_ = false;
+  next_question_ = 0;
   instance_->catch_up();
   const auto model = watch::ModelInForce::fetch(*instance_);
   generation_ = model.generation();
@@ -153,17 +182,24 @@ void Watcher::begin() {
   for (RecordPtr& record : states.records) start.records.push_back(std::move(record));
   for (RecordPtr& record : taps.records) start.records.push_back(std::move(record));
   start.add(model_change(model));
-  queue_.push(std::move(start));
-  hand_over_taps(true);
+  hand_over_start(std::move(start));
   try {
     look_at_ports();
   } catch (const std::exception&) {  // the daemon is busy: at the next look
   }
 }
 
-void Watcher::hand_over_taps(bool is_start) {
+void Watcher::hand_over_start(Batch&& start) {
+  {
+    const std::lock_guard lock(mutex_);
+    new_taps_ = {};
+    to_start_.push_back(std::move(start));
+  }
+  hand_over_taps();
+}
+
+void Watcher::hand_over_taps() {
   const std::lock_guard lock(mutex_);
-  if (is_start) new_taps_ = {true, {}};
   for (auto& tap : opened_) new_taps_.taps.push_back(std::move(tap));
   opened_.clear();
 }
@@ -171,6 +207,7 @@ void Watcher::hand_over_taps(bool is_start) {
 // The page is read once the tap is there.
 void Watcher::open_tap(const std::string& source, Batch& batch) {
   Watched& watched = sources_[source];
+  watched.id = instance_->find_source(source);
   const bool with_payloads =
       options_.payloads == "all" ||
       (options_.payloads != "none" && rules::matches(options_.payloads, source));
@@ -178,8 +215,9 @@ void Watcher::open_tap(const std::string& source, Batch& batch) {
   options.may_wait = false;
   options.max_held = with_payloads ? 1 : 0;
   try {
+    require_descriptors();
     Tap<> tap = node_->tap(source, options);
-    const ActivityWord word = page_word(source);
+    const ActivityWord word = page_word(watched.id);
     watched.seen = watched.reported = word;
     watched.tap = std::make_shared<TapReader>(std::move(tap), with_payloads, word);
     opened_.push_back(watched.tap);
@@ -188,7 +226,7 @@ void Watcher::open_tap(const std::string& source, Batch& batch) {
     watched.pause = std::clamp(2 * watched.pause, kTryAgainAfter, kTryAgainAtLeastEvery);
     watched.next_try = shm::monotonic_now() + watched.pause;
     if (is_known) return;
-    watched.seen = watched.reported = page_word(source);
+    watched.seen = watched.reported = page_word(watched.id);
     refusals_.emplace_back(source, error.what());
     const Nanoseconds now = shm::monotonic_now();
     batch.add(
@@ -235,10 +273,19 @@ void Watcher::try_refused() {
   if (due == sources_.end()) return;
   Batch batch;
   open_tap(due->first, batch);
-  if (!batch.records.empty()) queue_.push(std::move(batch));
+  if (!batch.records.empty()) push(std::move(batch));
   if (due->second.tap == nullptr) return;
   options_.say("recording " + due->first + " from here on");
-  hand_over_taps(false);
+  hand_over_taps();
+}
+
+// Those whose names came with pages.
+void Watcher::add_known_sources(std::set<std::string>& sources) const {
+  for (shm::SourceId id = 0; id < shm::kMaxSources; ++id) {
+    const auto gone = gone_.find(id);
+    const bool is_gone = gone != gone_.end() && gone->second == memory_->tables().pages().of(id);
+    if (!is_gone && memory_->pages().knows(id)) sources.insert(memory_->source_name(id));
+  }
 }
 
 // Sources that no model knew when watching began. Each has brought a page.
@@ -246,15 +293,13 @@ void Watcher::look_for_newcomers() {
   const std::uint64_t pages = memory_->pages().changes();
   if (pages == pages_of_newcomers_) return;
   std::set<std::string> all;
-  for (shm::SourceId id = 0; id < shm::kMaxSources; ++id) {
-    if (memory_->pages().knows(id)) all.insert(memory_->source_name(id));
-  }
+  add_known_sources(all);
   Batch batch;
   tap_newcomers(all, batch);
   pages_of_newcomers_ = pages;
   if (batch.records.empty()) return;
-  queue_.push(std::move(batch));
-  hand_over_taps(false);
+  push(std::move(batch));
+  hand_over_taps();
 }
 
 ActivityWord Watcher::page_word(const std::string& source) const {
@@ -308,46 +353,7 @@ void Watcher::look_at_pages() {
     add_page_state(source, word, batch);
     watched.reported = word;
   }
-  if (!batch.records.empty()) queue_.push(std::move(batch));
-}
-
-void Watcher::look_at_ports() {
-  const Nanoseconds now = shm::monotonic_now();
-  const bool is_due =
-      !ports_.is_known() || now - last_ports_ >= kPortsAtLeastEvery ||
-      (now - last_ports_ >= kPortsAtMostEvery && ports_changed_.load(std::memory_order_relaxed));
-  if (!is_due || !instance_->has_daemon()) return;
-  ports_changed_.store(false, std::memory_order_relaxed);
-  last_ports_ = now;
-  try {
-    const wire::Status status = instance_->status();
-    Batch batch;
-    ports_.note(status, shm::monotonic_now(), batch);
-    note_strangers(status.strangers, batch);
-    if (!batch.records.empty()) queue_.push(std::move(batch));
-  } catch (const wire::RefusedError&) {  // the policy does not let this user ask
-  }
-}
-
-// They go on by the memory of a daemon before, where nothing of this run is: who obeys them does,
-// and no tap of this memory tells of it.
-void Watcher::note_strangers(const std::vector<wire::StrangerStatus>& strangers, Batch& batch) {
-  for (const wire::StrangerStatus& stranger : strangers) {
-    const std::string component = stranger.node + " (pid " + std::to_string(stranger.pid) + ")";
-    std::vector<std::string> unrecorded;
-    for (const std::string& source : stranger.outputs) {
-      const bool is_recorded = options_.ports.empty() || sources_.count(source) != 0;
-      if (!is_recorded || !strangers_.insert({source, stranger.pid}).second) continue;
-      unrecorded.push_back(source);
-      batch.add(evidence::Missed{
-          source, begun_, shm::monotonic_now(), 0, 0, evidence::Missed::Why::stranger,
-          "of component " + component + ", which this daemon does not know"});
-    }
-    if (unrecorded.empty()) continue;
-    options_.say("cannot record " + rules::enumerate(unrecorded) + " of component " + component +
-                 ": it goes on by the memory of a daemon before, and this one does not know it; "
-                 "start it again");
-  }
+  if (!batch.records.empty()) push(std::move(batch));
 }
 
 }  // namespace arbiter::recorder

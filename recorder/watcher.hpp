@@ -2,15 +2,19 @@
 // force, what the pages of sources say that nobody tells of, and which ports are open.
 //
 //   watched_models.cpp  which model, and which sources that makes it watch
-//   watcher.cpp         taps, pages, ports; the thread
+//   watched_ports.cpp   what the daemon is asked for: ports; sources that are no more
+//   watcher.cpp         taps, pages; the thread
 //
 // A thread of its own, because it asks the daemon and opens taps, either of which may wait. It puts
-// what it finds into the queue, and hands taps to the thread that polls them.
+// what it finds into the queue, and hands taps to the thread that polls them. A source that nobody
+// has open, that no model names and that the daemon has forgotten is tapped no more: names may come
+// and go for as long as it records, and each tap takes descriptors, also of the daemon.
 #pragma once
 
 #include <atomic>
 #include <condition_variable>
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -36,8 +40,7 @@ namespace arbiter::recorder {
 
 class Watcher {
  public:
-  // Taps all sources that are to be recorded and puts the start into the queue. Keeps both. Throws
-  // wire::CallError, arbiter::Error.
+  // Taps all sources that are to be recorded. Keeps both. Throws wire::CallError, arbiter::Error.
   Watcher(const RecorderOptions& options, RecordQueue& queue);
   Watcher(const Watcher&) = delete;
   Watcher& operator=(const Watcher&) = delete;
@@ -51,12 +54,14 @@ class Watcher {
 
   // The thread that polls.
 
-  // Taps that were opened since; `is_start`: those before are to be forgotten.
   struct NewTaps {
-    bool is_start = false;
-    std::vector<std::shared_ptr<TapReader>> taps;
+    std::vector<std::shared_ptr<TapReader>> taps;  // that were opened since
+    std::vector<std::shared_ptr<TapReader>> over;  // are to be read once more, and forgotten
   };
-  [[nodiscard]] NewTaps take_taps();
+  // `forget_all`: where recording starts, or starts again. It forgets the taps before, and puts
+  // what they have told last into the queue: the start comes behind it, and nothing of theirs comes
+  // behind the start.
+  [[nodiscard]] NewTaps take_taps(const std::function<void()>& forget_all);
   // A tap has told of it. Relaxed is enough: it is a hint, and one that is missed comes again.
   void note_ports_changed() { ports_changed_.store(true, std::memory_order_relaxed); }
 
@@ -66,8 +71,9 @@ class Watcher {
   void tell_of_daemon();
   void begin();
   void begin_again();
+  void ask_daemon();
   void take_up_model();
-  [[nodiscard]] std::set<std::string> chosen_sources(const watch::ModelInForce& model) const;
+  [[nodiscard]] std::set<std::string> chosen_sources(const watch::ModelInForce& model);
   [[nodiscard]] bool is_chosen(const std::string& port) const;
   [[nodiscard]] evidence::ModelChange model_change(const watch::ModelInForce& model) const;
   [[nodiscard]] std::shared_ptr<const evidence::RuleTable> rule_table() const;
@@ -76,7 +82,11 @@ class Watcher {
   [[nodiscard]] std::vector<std::string> take_refusals();
   void tap_newcomers(const std::set<std::string>& sources, Batch& batch);
   void look_for_newcomers();
-  void hand_over_taps(bool is_start);
+  void add_known_sources(std::set<std::string>& sources) const;
+  void forget_gone(const wire::Status& status);
+  void push(Batch&& batch);
+  void hand_over_taps();
+  void hand_over_start(Batch&& start);
   void add_page_state(const std::string& source, evidence::ActivityWord word, Batch& batch) const;
   [[nodiscard]] evidence::ActivityWord page_word(const std::string& source) const;
   [[nodiscard]] evidence::ActivityWord page_word(std::optional<shm::SourceId> id) const;
@@ -107,6 +117,10 @@ class Watcher {
     std::uint64_t polls = 0;  // of the tap, when that was seen first
   };
   std::map<std::string, Watched> sources_;
+  std::set<std::string> named_;  // sources of the chosen ports, by the models
+  // Pages of sources that have been forgotten. Who comes under the name again has another page.
+  std::map<shm::SourceId, shm::PageNumber> gone_;
+  std::vector<std::shared_ptr<TapReader>> over_;  // of these: so that they are not closed elsewhere
   // ActivityPages::changes() when newcomers were looked for, and when ids were. It is never 0 once
   // there is a source.
   std::uint64_t pages_of_newcomers_ = 0;
@@ -117,10 +131,13 @@ class Watcher {
   OpenPorts ports_{0};
   watch::DaemonPresence presence_;
   Nanoseconds last_ports_ = 0;
+  bool may_not_observe_ = false;
+  Nanoseconds next_question_ = 0;                   // where it may not
   std::vector<std::shared_ptr<TapReader>> opened_;  // and not handed over yet
 
   std::mutex mutex_;
-  NewTaps new_taps_;  // under it
+  NewTaps new_taps_;             // under it
+  std::vector<Batch> to_start_;  // under it: a start that waits for the other thread, and the rest
   std::atomic<bool> ports_changed_{false};
   std::condition_variable stopping_;
   bool is_stopping_ = false;  // under the mutex

@@ -58,6 +58,15 @@ TEST_F(RingMemory, PayloadsGiveWayBeforeWhoCommanded) {
   EXPECT_EQ(missed[0].to, time_ - 30);
 }
 
+TEST_F(RingMemory, SourcesThatHaveComeAndGoneAreNotSummedUpForEver) {
+  constexpr std::size_t kMore = 1000;
+  arrive("/first");
+  for (std::size_t i = 0; i < shm::kMaxSources + kMore; ++i) arrive("/" + std::to_string(i));
+  dump(ring_, incident_);
+  const auto states = written<evidence::SourceState>();
+  EXPECT_LE(states.size(), 2 * kMore);
+}
+
 // What is left of it in the memory is all but its payload.
 TEST_F(RingMemory, ASampleThatIsLargerThanTheMemoryDrivesOutNothing) {
   for (int i = 0; i < 50; ++i) arrive("/high");

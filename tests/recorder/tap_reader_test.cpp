@@ -69,6 +69,31 @@ TEST_F(ReadSource, LeavesOutAPayloadThatNoReaderIsReadyFor) {
   EXPECT_EQ(none.counts().lost_samples, 1u);
 }
 
+// As its successor's may be, which has another version of the type.
+TEST(ReadSources, HaveTheAlignmentOfTheOneThatHasThemOpen) {
+  const Daemon daemon(kLasting);
+  Node node("test");
+  TapOptions options;
+  options.may_wait = false;
+  TapReader reader(node.tap("/low", options), false, shm::kNeverActive);
+  for (const std::size_t alignment : {8u, 4u}) {
+    auto port = node.output_port("/low", Type("t", 8, alignment));
+    const evidence::SourceContext* context = nullptr;
+    std::vector<evidence::RecordPtr> records;
+    Backlog backlog{{}, std::size_t{64} << 20};
+    while (context == nullptr) {
+      port.signal();
+      reader.poll(backlog, records);
+      for (const auto& record : records) {
+        if (std::holds_alternative<evidence::Arrival>(*record)) {
+          context = evidence::context_of(*record);
+        }
+      }
+    }
+    EXPECT_EQ(context->alignment, alignment);
+  }
+}
+
 // In one round: nobody knows of the next.
 TEST_F(ReadSource, LeavesOutPayloadsOnceMuchHasBeenRead) {
   TapReader source = reader();
