@@ -151,41 +151,31 @@ Truth LiveStatement::evaluate(const Picture& picture) const {
   rules::Evaluation evaluation([&](const std::string& name) {
     if (name.starts_with('=')) return evaluate(terms_.at(std::stoul(name.substr(1))), picture);
     const shm::SourceId source = sources_.at(name);
-    return sees(picture, source) ? rules::truth(picture.is_active(source)) : Truth::kUnknown;
+    return sees(*memory_, picture, source) ? rules::truth(picture.is_active(source))
+                                           : Truth::kUnknown;
   });
   return evaluation.of(*expression_);
 }
 
 Truth LiveStatement::evaluate(const Term& term, const Picture& picture) const {
-  if (!sees_port(picture, term.port)) return Truth::kUnknown;
+  if (!sees_port(*memory_, picture, term.port)) return Truth::kUnknown;
   const shm::SourceId winner = picture.winner_at(term.port);
   if (term.other) {
-    if (!sees_port(picture, *term.other)) return Truth::kUnknown;
+    if (!sees_port(*memory_, picture, *term.other)) return Truth::kUnknown;
     return rules::truth(winner == picture.winner_at(*term.other));
   }
   return rules::truth(term.nobody ? winner == shm::kNone : term.sources.contains(winner));
 }
 
-// A source that has never had a page has never been active.
-bool LiveStatement::sees(const Picture& picture, shm::SourceId source) const {
-  return !picture.is_unseen(source) || memory_->tables().pages().of(source) == 0;
-}
-
-bool LiveStatement::sees_port(const Picture& picture, shm::PortId port) const {
-  const auto heeded = rules::sources_heeded(picture.snapshot.table, port);
-  return std::all_of(heeded.begin(), heeded.end(),
-                     [&](shm::SourceId source) { return sees(picture, source); });
-}
-
 void LiveStatement::describe(Look& look) const {
   for (const auto& [name, port] : ports_) {
-    if (!sees_port(look.picture, port)) continue;
+    if (!sees_port(*memory_, look.picture, port)) continue;
     const shm::SourceId winner = look.picture.winner_at(port);
     look.winners[name] =
         winner == shm::kNone ? std::nullopt : std::optional(memory_->source_name(winner));
   }
   for (const auto& [name, source] : sources_) {
-    if (sees(look.picture, source)) look.active[name] = look.picture.is_active(source);
+    if (sees(*memory_, look.picture, source)) look.active[name] = look.picture.is_active(source);
   }
 }
 

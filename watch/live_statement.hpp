@@ -74,8 +74,6 @@ class LiveStatement {
   [[nodiscard]] Term bind_term(const shm::TableView& table, const rules::WinnerTerm& term) const;
   [[nodiscard]] rules::Truth evaluate(const Picture& picture) const;
   [[nodiscard]] rules::Truth evaluate(const Term& term, const Picture& picture) const;
-  [[nodiscard]] bool sees(const Picture& picture, shm::SourceId source) const;
-  [[nodiscard]] bool sees_port(const Picture& picture, shm::PortId port) const;
   void describe(Look& look) const;
 
   const std::shared_ptr<Instance> instance_;

@@ -69,6 +69,18 @@ Picture take_picture(const shm::DecisionMemory& memory, const SourcesOf& sources
   return picture;
 }
 
+bool sees(const shm::DecisionMemory& memory, const Picture& picture, shm::SourceId source) {
+  // A table that is being overwritten may name any source.
+  const bool is_one = source < shm::kMaxSources;
+  return !picture.is_unseen(source) || (is_one && memory.tables().pages().of(source) == 0);
+}
+
+bool sees_port(const shm::DecisionMemory& memory, const Picture& picture, shm::PortId port) {
+  const auto heeded = rules::sources_heeded(picture.snapshot.table, port);
+  return std::all_of(heeded.begin(), heeded.end(),
+                     [&](shm::SourceId source) { return sees(memory, picture, source); });
+}
+
 SourcesOf sources_at(shm::PortId port) {
   return [port](const shm::TableView& table) { return rules::sources_heeded(table, port); };
 }

@@ -42,6 +42,14 @@ using SourcesOf = std::function<std::vector<shm::SourceId>(const shm::TableView&
 // Wait-free: at most shm::kMaxPictures tries, then a picture that is not settled.
 [[nodiscard]] Picture take_picture(const shm::DecisionMemory& memory, const SourcesOf& sources_of);
 
+// Whether its page has come; one that has never had a page has never been active. Until it has, the
+// picture says nothing of it.
+[[nodiscard]] bool sees(const shm::DecisionMemory& memory, const Picture& picture,
+                        shm::SourceId source);
+// The same of all that the port heeds.
+[[nodiscard]] bool sees_port(const shm::DecisionMemory& memory, const Picture& picture,
+                             shm::PortId port);
+
 // All sources that a port is connected to or reads.
 [[nodiscard]] SourcesOf sources_at(shm::PortId port);
 // All that the model mentions.

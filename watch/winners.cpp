@@ -42,13 +42,17 @@ std::vector<WinnerAt> Winners::look() {
   std::vector<WinnerAt> news;
   std::map<std::string, WinnerAt> all;
   for (const auto& [name, id] : ports(table)) {
+    const auto last = now_.find(name);
+    if (!sees_port(*memory, picture, id)) {  // who wins is not known
+      if (last != now_.end()) all.insert(*last);
+      continue;
+    }
     WinnerAt at{name, {}, {}};
     at.is_arbitrated = table.is_arbitrated(id);
     at.generation = picture.snapshot.generation;
     at.time = at.seen = picture.now;
     const shm::SourceId winner = picture.winner_at(id);
     if (winner != shm::kNone) at.winner = memory->source_name(winner);
-    const auto last = now_.find(name);
     at.is_first = last == now_.end();
     if (!at.is_first) at.before = last->second.winner;
     const bool is_news =

@@ -36,8 +36,8 @@ class Winners {
   // Keeps the instance, of which the owner calls update().
   Winners(std::shared_ptr<Instance> instance, Wanted wanted);
 
-  // The ports that are new, and those whose winner is another than at the last look. Empty where no
-  // picture of one moment could be taken.
+  // The ports that are new, and those whose winner is another than at the last look. Without those
+  // of which not all sources can be seen yet; empty where no picture of one moment could be taken.
   std::vector<WinnerAt> look();
   // Of each port, as it was at the last look.
   [[nodiscard]] const std::map<std::string, WinnerAt>& now() const { return now_; }
