@@ -189,6 +189,12 @@ Line View::title(std::size_t columns) const {
     return two_sided(left, "  NO ANSWER from the daemon", columns, Style::kTitle, Style::kWarning,
                      charset_);
   }
+  if (const std::size_t strangers = frame->census->strangers; strangers != 0) {
+    const std::string who =
+        std::to_string(strangers) + (strangers == 1 ? " component" : " components");
+    return two_sided(left, "  " + who + " unknown: see arbiter status", columns, Style::kTitle,
+                     Style::kWarning, charset_);
+  }
   return two_sided(left, "  live", columns, Style::kTitle, Style::kTitle, charset_);
 }
 

@@ -129,6 +129,7 @@ Census census_of(const StampedStatus& now, const StampedStatus* before) {
   census.instance = now.status.instance;
   census.model = model_text(now.status.model);
   census.first_model_since = first_model_since(now);
+  census.strangers = now.status.strangers.size();
   std::map<std::string_view, const wire::InputStatus*> inputs;
   std::map<std::string_view, const wire::SourceStatus*> sources;
   if (before != nullptr) {

@@ -57,6 +57,8 @@ struct Census {
   std::string model;  // `model 2 "work"`
   // Since when the model in force has been so, if no other one was before it; else 0.
   shm::Nanoseconds first_model_since = 0;
+  // Components that the daemon does not know: they go on by the memory of one before.
+  std::size_t strangers = 0;
   std::vector<PortFact> ports;  // by name
   std::vector<SourceFact> sources;
 

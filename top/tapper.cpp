@@ -64,7 +64,8 @@ void Tapper::run(const std::stop_token& stop) {
     std::string port;
     {
       std::unique_lock lock(mutex_);
-      if (!asked_.wait(lock, stop, [this] { return !to_open_.empty(); })) return;
+      asked_.wait(lock, stop, [this] { return !to_open_.empty(); });
+      if (stop.stop_requested()) return;
       port = to_open_.front();
       to_open_.erase(to_open_.begin());
     }

@@ -295,6 +295,15 @@ TEST_F(TopView, SaysThatThereIsNoDaemonAndThatItCannotAsk) {
   EXPECT_THAT(screen(), HasSubstr("NO DAEMON"));
 }
 
+// They may command somebody who is idle here.
+TEST_F(TopView, SaysThatThereAreComponentsThatTheDaemonDoesNotKnow) {
+  Census census = census_of_robot();
+  census.strangers = 2;
+  view_.add(shared(frame_at(11, std::make_shared<const Census>(census))), {});
+  EXPECT_THAT(view_.draw({80, 24})[0].text(),
+              testing::EndsWith("  2 components unknown: see arbiter status"));
+}
+
 // What to do about it comes last, so a problem gets the lines that it needs.
 TEST_F(TopView, BreaksAProblemThatIsWiderThanTheScreen) {
   view_.set_problem("not tapped: user 1000 may not tap the port /" + std::string(50, 'p') +
