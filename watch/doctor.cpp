@@ -234,9 +234,9 @@ Findings examine_meeting_places() {
       found.push_back({"strangers-directory",
                        directory + " belongs to a user whose daemons are not trusted",
                        "components do not look into it, so that they do not find a daemon there",
-                       "rm -r " + directory +
-                           ", or start the daemon as root, as arbiter or as this "
-                           "user"});
+                       "start the daemon as root, as arbiter or as this user; if `ss -xl` shows "
+                       "nobody who listens there, you may also rm -r " +
+                           directory + ": a daemon that runs there would lose its state"});
       continue;
     }
     for (const std::string& path : abandoned_sockets(directory)) {

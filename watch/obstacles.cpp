@@ -229,10 +229,14 @@ std::vector<Obstacle> Obstacles::of_connection(const std::string& source) const 
       " been refused since the ports were opened, because the queue was full (refuse_new)" +
           (shorter.empty() ? "" : ": " + shorter),
       true);
+  // With room for one sample, a component wants the newest, and no other.
+  const bool wants_newest = shorter.empty() && is_open() && input_->open->depth == 1;
   say(connection.overtaken, "overtaken", " has", " have",
       " been lost to newer ones since the ports were opened, because " +
-          (shorter.empty() ? component + " took them too slowly" : shorter),
-      true);
+          (wants_newest      ? "the queue keeps the newest alone (depth 1)"
+           : shorter.empty() ? component + " took them too slowly"
+                             : shorter),
+      !wants_newest);
   // Arbitration at both ends is no fault, nor is a component that takes when it wants to.
   say(connection.dropped, "dropped", " that had been accepted was", " that had been accepted were",
       " dropped at the take since the ports were opened, because this connection no longer won",
