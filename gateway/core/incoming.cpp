@@ -41,7 +41,8 @@ OutputPort<void> open(Node& node, const std::string& name, const Entry& entry) {
 
 std::string does_not_fit(const Entry& entry, std::size_t bytes) {
   const bool has_one_size = entry.type && entry.type->size != 0;
-  return "the last of " + std::to_string(bytes) + (bytes == 1 ? " byte; " : " bytes; ") +
+  return "the last bad sample has " + std::to_string(bytes) +
+         (bytes == 1 ? " byte; " : " bytes; ") +
          (has_one_size ? entry.type->name + " has " + std::to_string(entry.type->size)
                        : "max_size is " + std::to_string(entry.max_size));
 }

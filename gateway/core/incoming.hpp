@@ -40,7 +40,8 @@ class ForeignSample {
 
 class Outgoing;
 
-// Why a sample of so many bytes does not fit: "the last of 5012 bytes; max_size is 1024".
+// Why a sample of so many bytes does not fit: "the last bad sample has 5012 bytes; max_size is
+// 1024".
 [[nodiscard]] std::string does_not_fit(const Entry& entry, std::size_t bytes);
 
 // Which source a sample's field chooses; empty: it has none, or it is NaN, or no Boolean.

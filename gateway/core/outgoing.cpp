@@ -92,7 +92,7 @@ bool Outgoing::has_right_header(const Incoming& in, std::size_t size) {
   if (have_one_header(in.entry(), entry_)) return true;
   account_for(Sender::Result::kUnreadable, size);
   if (std::exchange(told_, &in) != &in) {
-    account_.set_last_reason("the last has " + header_text(in.entry()) + "; " +
+    account_.set_last_reason("the last bad sample has " + header_text(in.entry()) + "; " +
                              header_advice(in.entry(), entry_));
   }
   return false;

@@ -78,8 +78,8 @@ void EndPoint::close() noexcept {
 }
 
 std::string EndPoint::wrong_size(std::size_t bytes) const {
-  return "the last has " + std::to_string(bytes) + (bytes == 1 ? " byte; " : " bytes; ") +
-         entry_.type->name + " has " +
+  return "the last bad sample has " + std::to_string(bytes) +
+         (bytes == 1 ? " byte; " : " bytes; ") + entry_.type->name + " has " +
          std::to_string(padded(kEncapsulationBytes + topic_.size.value_or(0)));
 }
 

@@ -66,8 +66,8 @@ class EndPoint {
   [[nodiscard]] std::mutex& in_use() const { return in_use_; }
   [[nodiscard]] const Entry& entry() const { return entry_; }
   [[nodiscard]] Account& account() const { return account_; }
-  // Of a sample of so many bytes that cannot be of a type whose size is known: "the last has 8
-  // bytes; geometry_msgs/msg/Twist has 52".
+  // Of a sample of so many bytes that cannot be of a type whose size is known: "the last bad sample
+  // has 8 bytes; geometry_msgs/msg/Twist has 52".
   [[nodiscard]] std::string wrong_size(std::size_t bytes) const;
 
  private:

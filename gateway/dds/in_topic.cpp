@@ -85,15 +85,15 @@ std::string InTopic::sentence(Fault fault, std::size_t size) const {
     case Fault::kNone:
       return "";
     case Fault::kHeader:
-      return "the last does not begin with an encapsulation header of DDS";
+      return "the last bad sample does not begin with an encapsulation header of DDS";
     case Fault::kSize:
       return wrong_size(size);
     case Fault::kEncoding:
-      return "the last is encoded so that its field may stand elsewhere";
+      return "the last bad sample is encoded so that its field may stand elsewhere";
     case Fault::kField:
-      return "the field of the last chooses neither source";
+      return "the field of the last bad sample chooses neither source";
     case Fault::kCut:
-      return "the last is not whole";
+      return "the last bad sample is not whole";
     case Fault::kTooLarge:
       break;
   }

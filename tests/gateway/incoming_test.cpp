@@ -81,10 +81,11 @@ TEST_F(Arriving, WhatDoesNotFitIsCountedAndPassedOver) {
 
 TEST(DoesNotFit, SaysBothSizes) {
   const Read variable = read_dds("<in topic='/a' type='a/msg/B' port='/a:o' max_size='1KiB'/>");
-  EXPECT_EQ(does_not_fit(variable.entry(), 5012), "the last of 5012 bytes; max_size is 1024");
+  EXPECT_EQ(does_not_fit(variable.entry(), 5012),
+            "the last bad sample has 5012 bytes; max_size is 1024");
   const Read fixed =
       read_iceoryx("<in service='a' instance='b' event='c' port='/a:o' type='Speed' size='16'/>");
-  EXPECT_EQ(does_not_fit(fixed.entry(), 1), "the last of 1 byte; Speed has 16");
+  EXPECT_EQ(does_not_fit(fixed.entry(), 1), "the last bad sample has 1 byte; Speed has 16");
 }
 
 // Until then it is not for ever either, but that is another thing to say.

@@ -191,8 +191,9 @@ TEST_F(OtherHeaders, WhatBeginsWithAnotherHeaderIsNotSent) {
   EXPECT_THAT(sender_.sent, testing::Each(zeros));
   EXPECT_EQ(account_.unreadable.value(), 2u);
   EXPECT_EQ(account_.passed.value(), 0u);
-  EXPECT_THAT(account_.text(), testing::EndsWith("2 unreadable; the last has a user header of 8 "
-                                                 "bytes; write user_header=\"8\" at the <out>"));
+  EXPECT_THAT(account_.text(),
+              testing::EndsWith("2 unreadable; the last bad sample has a user header of 8 "
+                                "bytes; write user_header=\"8\" at the <out>"));
 }
 
 // One that delivers and the loop meet at one port: no sample is sent twice, none out of order, and

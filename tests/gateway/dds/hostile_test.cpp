@@ -107,7 +107,7 @@ TEST_P(DdsOfAnotherLayout, ATwistThatCannotBeOneDoesNotWin) {
     ::poll(nullptr, 0, 1);
   }
   await_described(daemon, "/Teleop/cmd_vel:o",
-                  "unreadable; the last has 8 bytes; geometry_msgs/msg/Twist has 52");
+                  "unreadable; the last bad sample has 8 bytes; geometry_msgs/msg/Twist has 52");
   EXPECT_EQ(daemon.source("/Teleop/cmd_vel:o")["published"], 0);
   publish_until_heard(navigation, base, "2 0");
 }
@@ -124,7 +124,7 @@ TEST(DdsHostile, ASampleOfAnotherSizeThanTheMappingSaysIsNoArrival) {
   gateway.see("1 publisher matched");
   liar.publish(kLittle + std::string(8, '\0'));
   await_described(daemon, "/Fleet/robot:o",
-                  "1 unreadable; the last has 12 bytes; strangers::Robot has 20");
+                  "1 unreadable; the last bad sample has 12 bytes; strangers::Robot has 20");
   EXPECT_EQ(daemon.source("/Fleet/robot:o")["published"], 0);
   liar.publish(kLittle + std::string(16, '\0'));
   await([&] { return daemon.source("/Fleet/robot:o")["published"] == 1; });
@@ -177,7 +177,8 @@ TEST(DdsHostile, ABooleanThatIsNoneEndsBothSources) {
     EXPECT_TRUE(button.is_active("/no:o"));
     button.publish_to_none(kLittle + none);
   }
-  await_described(button.daemon, "/no:o", "the last has 4 bytes; std_msgs/msg/Bool has 8");
+  await_described(button.daemon, "/no:o",
+                  "the last bad sample has 4 bytes; std_msgs/msg/Bool has 8");
 }
 
 // An appendable type of XCDR2 begins with its length, which is 1 for a Boolean; a mutable one has

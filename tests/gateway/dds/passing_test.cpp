@@ -104,7 +104,7 @@ TEST(DdsSize, WhatCannotBeATwistIsNotSentAndTheBaseIsTold) {
   base.await("sample 1 0");
   publish(twist_bytes('\1', 2).substr(0, 44));
   await_described(daemon, "/Base/cmd_vel:i",
-                  "1 unreadable; the last has 44 bytes; geometry_msgs/msg/Twist has 52");
+                  "1 unreadable; the last bad sample has 44 bytes; geometry_msgs/msg/Twist has 52");
   EXPECT_EQ(base.next_line(), "sample 0 0");
   EXPECT_EQ(base.next_line(), "sample 0 0");
   publish(twist_bytes('\1', 3));
@@ -184,10 +184,12 @@ TEST_P(DdsPassing, WhatDoesNotFitIsCountedAndPassedOver) {
   const std::string first = "0 3";
   publish_until_heard(blobs.from, blobs.to, first);
   blobs.from.publish("1 5000");
-  await_described(blobs.daemon, "/From:o",
-                  "1 of a size that does not fit; the last of 5012 bytes; max_size is 1024");
+  await_described(
+      blobs.daemon, "/From:o",
+      "1 of a size that does not fit; the last bad sample has 5012 bytes; max_size is 1024");
   blobs.from.publish("2 8000");
-  await_described(blobs.daemon, "/From:o", "2 of a size that does not fit; the last of 8012 bytes");
+  await_described(blobs.daemon, "/From:o",
+                  "2 of a size that does not fit; the last bad sample has 8012 bytes");
   blobs.from.publish("3 100");
   EXPECT_EQ(line_after(blobs.to, first), "sample 3 100");
 }

@@ -85,7 +85,7 @@ TEST_F(Iceoryx, WhatBeginsWithAHeaderIsNotSentWithoutOne) {
   low.say("drive");
   wait_until([&] {
     return described_input("/Base:i").find(
-               "1 unreadable; the last has a user header of 8 bytes; "
+               "1 unreadable; the last bad sample has a user header of 8 bytes; "
                "write user_header=\"8\" at the <out>") != std::string::npos;
   });
   high.say("stop");
@@ -100,8 +100,8 @@ TEST_F(Iceoryx, AChunkThatIsTooLargeIsToldWithBothSizes) {
   Spoken publisher = plain_publisher("low");
   wait_for_description("/Low:o", "1 publisher matched");
   publisher.say("#9");
-  wait_for_description("/Low:o",
-                       "1 of a size that does not fit; the last of 9 bytes; max_size is 8");
+  wait_for_description(
+      "/Low:o", "1 of a size that does not fit; the last bad sample has 9 bytes; max_size is 8");
 }
 
 // Without a service manager nobody else would tell the robot.
