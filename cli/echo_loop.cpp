@@ -19,7 +19,7 @@ constexpr shm::Nanoseconds kEchoLookInterval = 100'000'000;
 }  // namespace
 
 shm::Nanoseconds end_of_echo(const EchoOptions& options, shm::Nanoseconds started) {
-  return options.duration == shm::kForever ? shm::kForever : started + options.duration;
+  return time_after(started, options.duration);
 }
 
 NodeOptions echo_node_options(const EchoOptions& options) {

@@ -18,6 +18,7 @@
 #include "recorder/ring.hpp"
 #include "recorder/statement_watch.hpp"
 #include "rules/text/names.hpp"
+#include "shm/clock.hpp"
 
 namespace arbiter::cli {
 namespace {
@@ -61,7 +62,8 @@ class Flight {
                                                             : seconds_text(options_.span);
     std::cerr << "arbiter: keeping the last " + span + " of " +
                      rules::counted(recorder_.taps(), "source") + '\n';
-    recorder_.run(options_.end, events_.get(), [this] { return take_up_events(); });
+    recorder_.run(time_after(shm::monotonic_now(), options_.duration), events_.get(),
+                  [this] { return take_up_events(); });
     statement_.reset();
     recorder_.finish();
     take_up_answers();

@@ -16,10 +16,10 @@ struct FlightOptions {
   shm::Nanoseconds span = 0;  // 0: no flight recorder
   std::size_t memory = std::size_t{64} << 20;
   std::string prefix;
-  std::size_t keep = 16;                   // files that it writes of its own accord
-  std::optional<std::string> when;         // a statement
-  shm::Nanoseconds after = 2'000'000'000;  // of what follows, in a file of its own accord
-  shm::Nanoseconds end = shm::kForever;
+  std::size_t keep = 16;                      // files that it writes of its own accord
+  std::optional<std::string> when;            // a statement
+  shm::Nanoseconds after = 2'000'000'000;     // of what follows, in a file of its own accord
+  shm::Nanoseconds duration = shm::kForever;  // from the first look on
 };
 
 // Until SIGINT, SIGTERM or SIGHUP; SIGUSR1 writes a file.

@@ -6,6 +6,7 @@
 #include <map>
 #include <memory>
 #include <set>
+#include <stdexcept>
 #include <string>
 #include <utility>
 
@@ -30,6 +31,8 @@ constexpr shm::Nanoseconds kFollowPeriod = 100'000'000;
 constexpr shm::Nanoseconds kHostsPeriod = 1'000'000'000;
 // Behind a question that was not answered: nothing is drawn while it waits.
 constexpr shm::Nanoseconds kHostsPause = 5'000'000'000;
+// Behind a picture that could not be drawn.
+constexpr shm::Nanoseconds kDrawPause = 1'000'000'000;
 // Where models change faster than they can be drawn.
 constexpr int kMostLoads = 5;
 
@@ -106,6 +109,7 @@ class LivePicture {
       : options_(options), instance_(instance), picture_(options), inquirer_(options.instance) {
     static_cast<void>(inquirer_.ask());
   }
+  void heed(const shm::FileDescriptor& interrupts) { picture_.heed(interrupts); }
   // What is to be drawn again and again must not wait for other hosts.
   void begin_to_follow() {
     inquirer_.begin();
@@ -231,14 +235,19 @@ int draw_live(const GraphOptions& options) {
 }
 
 // While there is no daemon, what was decided last goes on, and so does the picture of it.
-int draw_and_follow(const GraphOptions& options) {
+int draw_and_follow(const GraphOptions& options) try {
   const shm::FileDescriptor interrupts = catch_interrupts();
   const auto instance = follow_instance("graph", options.instance);
   LivePicture picture(options, *instance);
+  picture.heed(interrupts);
   if (!picture.update()) return 1;
   picture.begin_to_follow();
   DaemonNews news("drawing");
   std::string said;
+  const auto say = [&](const std::string& why) {
+    if (std::exchange(said, why) == why) return;
+    std::cerr << "arbiter: " << why << "; " << options.output << " stays as it was\n";
+  };
   for (shm::Nanoseconds next = shm::monotonic_now();;) {
     next = std::max(next + kFollowPeriod, shm::monotonic_now());
     if (sleep_until(next, interrupts)) return 0;
@@ -246,15 +255,19 @@ int draw_and_follow(const GraphOptions& options) {
     news.tell(*instance);
     try {
       if (!picture.update()) return 1;
+      said.clear();
     } catch (const wire::CallError& error) {
       // If it has gone before it could be asked for its model, the next one is asked.
-      if (!instance->has_daemon() || std::exchange(said, error.what()) == error.what()) continue;
-      std::cerr << "arbiter: " << error.what() << "; " << options.output << " stays as it was\n";
-    } catch (const Error& error) {
-      if (std::exchange(said, error.what()) == error.what()) continue;
-      std::cerr << "arbiter: " << error.what() << "; " << options.output << " stays as it was\n";
+      if (instance->has_daemon()) say(error.what());
+    } catch (const rules::FileError&) {
+      throw;
+    } catch (const std::runtime_error& error) {  // such as of a model that lacks the port
+      say(error.what());
+      next += kDrawPause;
     }
   }
+} catch (const PictureInterrupted&) {
+  return 0;
 }
 
 }  // namespace arbiter::cli

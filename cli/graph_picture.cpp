@@ -12,6 +12,7 @@
 #include <CLI/CLI.hpp>
 
 #include "cli/graph_hosts.hpp"
+#include "cli/live.hpp"
 #include "cli/model_files.hpp"
 #include "cli/output_file.hpp"
 #include "cli/progress.hpp"
@@ -85,6 +86,7 @@ Picture::Picture(const GraphOptions& options) : options_(options), format_(forma
 
 bool Picture::load(const rules::ModelTexts& texts, const std::string& in_force) {
   require_no_input(options_.output, texts);
+  require_no_input("--output", options_.output, options_.hosts);
   rules::Diagnostics diagnostics;
   model_ = rules::load_all(texts, diagnostics);
   diagnostics.drop_notes();
@@ -158,6 +160,7 @@ void Picture::find_places() {
 std::string Picture::lay_out(const std::string& text) const {
   ProgressLine progress;
   const drawing::Waiting waiting{[&] {
+    if (interrupts_ != nullptr && sleep_until(0, *interrupts_)) throw PictureInterrupted();
     progress.show([&] {
       return "Graphviz lays the picture out, for " + std::to_string(progress.elapsed().count()) +
              " s now; --port draws a part, --format dot does without it";

@@ -8,6 +8,7 @@
 #include "drawing/drawing.hpp"
 #include "drawing/places.hpp"
 #include "rules/model/load.hpp"
+#include "shm/file_descriptor.hpp"
 
 namespace arbiter::cli {
 
@@ -25,6 +26,9 @@ struct GraphOptions {
   bool follow = false;
 };
 
+// Thrown where somebody has had enough of waiting for Graphviz.
+struct PictureInterrupted {};
+
 class Picture {
  public:
   // Throws CLI::ValidationError where the options ask for what there is not.
@@ -37,6 +41,9 @@ class Picture {
 
   // If not, rules contradict each other: to see where is what one may draw them for.
   [[nodiscard]] bool is_good() const { return is_good_; }
+
+  // While Graphviz is at work, too: write() throws PictureInterrupted once they are readable.
+  void heed(const shm::FileDescriptor& interrupts) { interrupts_ = &interrupts; }
 
   // All of them, drawn or not.
   [[nodiscard]] const rules::RuleSet& rules() const { return model_.rules; }
@@ -53,6 +60,7 @@ class Picture {
   [[nodiscard]] std::string lay_out(const std::string& text) const;
 
   const GraphOptions& options_;
+  const shm::FileDescriptor* interrupts_ = nullptr;
   const std::string format_;
   drawing::Page page_;
   rules::LoadedModel model_;

@@ -95,6 +95,11 @@ shm::FileDescriptor catch_interrupts();
 // shell reports for a program that the signal has ended. `interrupts` is readable.
 [[nodiscard]] int interrupted_exit_code(const shm::FileDescriptor& interrupts);
 
+// Spans may be longer than time is.
+[[nodiscard]] constexpr shm::Nanoseconds time_after(shm::Nanoseconds start, shm::Nanoseconds span) {
+  return span >= shm::kForever - start ? shm::kForever : start + span;
+}
+
 // Sleeps until `time` on CLOCK_MONOTONIC, or until `interrupts` is readable; true: it is.
 bool sleep_until(shm::Nanoseconds time, const shm::FileDescriptor& interrupts);
 

@@ -1,5 +1,6 @@
 // arbiter: the tool on the command line.
 #include <algorithm>
+#include <array>
 #include <csignal>
 #include <exception>
 #include <iostream>
@@ -33,9 +34,19 @@ void say(const std::string& what) {
 
 // What other programs call a verb; empty: none.
 std::string_view verb_for(std::string_view word) {
-  if (word == "explain") return "why";
-  if (word == "validate") return "check";
-  return {};
+  constexpr std::array<std::pair<std::string_view, std::string_view>, 8> kMeant{{
+      {"explain", "why"},
+      {"validate", "check"},
+      {"watch", "top"},
+      {"monitor", "top"},
+      {"tail", "echo"},
+      {"list", "status"},
+      {"ls", "status"},
+      {"info", "status"},
+  }};
+  const auto* const found = std::find_if(kMeant.begin(), kMeant.end(),
+                                         [&](const auto& each) { return each.first == word; });
+  return found == kMeant.end() ? std::string_view() : found->second;
 }
 
 // What a verb has no option for, and another verb does.

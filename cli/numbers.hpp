@@ -6,6 +6,7 @@
 
 namespace arbiter::cli {
 
+using command_line::at_least;
 using command_line::at_least_one;
 using command_line::number_between;
 using command_line::one_of;

@@ -23,9 +23,9 @@ namespace {
 void write_to(const std::string& path, const std::string& content) {
   errno = 0;
   std::ofstream file(path, std::ios::binary);
-  if (!file.write(content.data(), static_cast<std::streamsize>(content.size())) || !file.flush()) {
-    fail(path);
-  }
+  file.write(content.data(), static_cast<std::streamsize>(content.size()));
+  file.close();  // which may be the first to hear that there is no room: of a file server, a quota
+  if (!file) fail(path);
 }
 
 // By its own name, too: where a shell has led it to a file, that would look like one that is there.
@@ -52,6 +52,25 @@ bool will_be_one_file(const std::string& path, const std::string& other) {
   };
   const fs::path place = place_of(path);
   return !place.empty() && place == place_of(other);
+}
+
+// Where links lead to, also if it is not there yet.
+std::filesystem::path target_of(std::filesystem::path path) {
+  constexpr int kMostLinks = 40;  // as the kernel has it
+  std::error_code no_link;
+  for (int i = 0; i < kMostLinks; ++i) {
+    const auto next = std::filesystem::read_symlink(path, no_link);
+    if (no_link) break;
+    path = path.parent_path() / next;
+  }
+  return path;
+}
+
+// Beside it, and as short, where its own name has no room for more.
+std::string temporary_beside(const std::filesystem::path& target) {
+  constexpr std::size_t kMostOfName = 200;
+  const std::string name = target.filename().string().substr(0, kMostOfName);
+  return (target.parent_path() / (name + ".new-" + std::to_string(getpid()))).string();
 }
 
 }  // namespace
@@ -82,6 +101,10 @@ void require_two_files(const std::string& option, const std::string& output,
                          " are one file; nothing was written: give another file");
 }
 
+void require_named_file(const std::string& output, const std::string& why) {
+  if (!output.empty() && is_standard_output(output)) throw CLI::ValidationError("--output", why);
+}
+
 void add_force_option(CLI::App& verb, bool& replaces) {
   verb.add_flag("--force", replaces, "Replace files that are there already");
 }
@@ -106,9 +129,8 @@ void write_output(const std::string& path, const std::string& content) {
   std::error_code unknown;
   const fs::file_status status = fs::status(path, unknown);
   if (fs::exists(status) && !fs::is_regular_file(status)) return write_to(path, content);
-  // A link stays one: what it leads to is replaced.
-  const fs::path target = fs::exists(status) ? fs::canonical(path, unknown) : fs::path(path);
-  const std::string temporary = target.string() + ".new-" + std::to_string(getpid());
+  const fs::path target = target_of(path);  // a link stays one: what it leads to is replaced
+  const std::string temporary = temporary_beside(target);
   try {
     write_to(temporary, content);
   } catch (const rules::FileError&) {

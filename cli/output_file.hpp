@@ -19,6 +19,9 @@ void require_no_input(const std::string& option, const std::string& output,
 void require_two_files(const std::string& option, const std::string& output,
                        const std::string& other_option, const std::string& other);
 
+// Throws CLI::ValidationError, which says why, where `output` is given and is standard output.
+void require_named_file(const std::string& output, const std::string& why);
+
 // --force, for verbs whose files somebody may have changed by hand or may have no second time.
 void add_force_option(CLI::App& verb, bool& replaces);
 

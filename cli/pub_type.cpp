@@ -132,6 +132,10 @@ const std::string or_name_it = std::string("or name the type with --type ") + kT
       rules::advise(port, names, "`arbiter status` shows the ports that there are"));
 }
 
+Type known_type(const Known& port) {
+  return {(*port.type)->name, (*port.type)->size, (*port.type)->alignment};
+}
+
 }  // namespace
 
 Type parse_type(const std::string& text) {
@@ -167,7 +171,16 @@ Type type_like(const wire::Status& status, const std::string& port) {
   if (!*model.type) {
     fail_like(model.text(), "leave --like out to send untyped samples, " + or_name_it);
   }
-  return {(*model.type)->name, (*model.type)->size, (*model.type)->alignment};
+  return known_type(model);
+}
+
+std::optional<Type> type_of_receivers(const wire::Status& status, const std::string& source) {
+  const std::vector<Known> typed = receivers_of(status, source).typed;
+  const bool is_one = !typed.empty() &&
+                      std::all_of(typed.begin(), typed.end(),
+                                  [&](const auto& each) { return are_same(each, typed.front()); });
+  if (!is_one || (*typed.front().type)->alignment == 0) return {};  // as of a variable type
+  return known_type(typed.front());
 }
 
 std::string describe(const Type& type) {

@@ -1,6 +1,7 @@
 // As what arbiter pub opens its port: a type from the command line, or that of a running port.
 #pragma once
 
+#include <optional>
 #include <string>
 
 #include <arbiter/type.hpp>
@@ -20,6 +21,11 @@ inline constexpr const char* kTypeForm = "NAME:SIZE:ALIGN";
 // that its input ports take. Throws std::runtime_error where there is no such type, or several: the
 // message says what to do.
 [[nodiscard]] Type type_like(const wire::Status& status, const std::string& port);
+
+// The type of all typed input ports that are open and connected to that source. Nothing: there is
+// none, they differ, or its samples have no size of their own.
+[[nodiscard]] std::optional<Type> type_of_receivers(const wire::Status& status,
+                                                    const std::string& source);
 
 // "geometry/Twist (48 bytes, aligned to 8)".
 [[nodiscard]] std::string describe(const Type& type);

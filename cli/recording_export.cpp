@@ -15,6 +15,7 @@
 #include "cli/recording_compile.hpp"
 #include "cli/simulate_recording.hpp"
 #include "evidence/export.hpp"
+#include "shm/utf8.hpp"
 
 namespace arbiter::cli {
 namespace {
@@ -49,7 +50,7 @@ int export_recording(const ExportOptions& options) {
   const auto recorded = evidence::load_recording(options.file, line.watch("reading the recording"));
   line.clear();
   if (!recorded.about.end.is_whole) {
-    std::cerr << "arbiter: " << options.file << ": " << recorded.about.end.problem
+    std::cerr << "arbiter: " << shm::printable(options.file) << ": " << recorded.about.end.problem
               << "; what comes before is exported\n";
   }
   warn_of_missed(recorded);

@@ -6,8 +6,10 @@
 
 #include <nlohmann/json.hpp>
 
+#include "cli/output_file.hpp"
 #include "cli/progress.hpp"
 #include "evidence/record_schemas.hpp"
+#include "shm/utf8.hpp"
 #include "wire/document.hpp"
 
 namespace arbiter::cli {
@@ -261,9 +263,10 @@ int show_recording(const std::string& path, bool json) {
 }
 
 int repair_recording(const std::string& path, const std::string& output) {
+  require_named_file(output, kMustBeFile);
   const RecordingInfo before = inspect_recording(path);
   if (before.end.is_whole && before.end.has_summary) {
-    std::cout << path << " is whole; nothing was written\n";
+    std::cout << shm::printable(path) << " is whole; nothing was written\n";
     return 0;
   }
   const std::string to = output.empty() ? name_for(path) : output;
@@ -271,7 +274,7 @@ int repair_recording(const std::string& path, const std::string& output) {
   const auto end = recording::repair_mcap(path, to, "arbiter " ARBITER_VERSION,
                                           recording::kMaxChunkBytes, line.watch("repairing"));
   line.clear();
-  std::cout << "wrote " << to << ": " << before.messages
+  std::cout << "wrote " << shm::printable(to) << ": " << before.messages
             << (before.messages == 1 ? " message" : " messages") << ", from the first "
             << end.whole_bytes << " of " << end.file_bytes << " bytes\n";
   if (!end.is_whole) {

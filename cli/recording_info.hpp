@@ -85,6 +85,11 @@ void write_text(std::ostream& out, const RecordingInfo& info);
 // `arbiter recording info`: the exit code is 1 if the file is not whole.
 int show_recording(const std::string& path, bool json);
 
+// What to say to who would have one go to standard output.
+inline constexpr const char* kMustBeFile =
+    "a recording is a file, and cannot go to standard output; give it a name, such as "
+    "incident.mcap";
+
 // `arbiter recording repair`. `output`: empty for a name made from the path's.
 int repair_recording(const std::string& path, const std::string& output);
 

@@ -18,6 +18,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "cli/numbers.hpp"
 #include "cli/output_file.hpp"
 #include "cli/progress.hpp"
 #include "cli/recording_times.hpp"
@@ -198,7 +199,7 @@ void add_recorded_sample(CLI::App& parent, int& exit_code) {
       verb->add_option("--sequence", options->sequence,
                        "Its number, as `arbiter echo` and the recording count; without "
                        "this and --at, the last that was recorded");
-  sequence->type_name("N");
+  sequence->type_name("N")->check(at_least(0));
   verb->add_option("--at", options->at,
                    "The last that had come by this time of day, in your time zone (TZ): 14:03:07 "
                    "(by the end of that second), 14:03:07.250, '2026-11-22 14:03:07'")

@@ -8,6 +8,7 @@
 #include <string_view>
 
 #include "cli/recording_info.hpp"
+#include "command_line/shell_word.hpp"
 #include "evidence/recorded.hpp"
 #include "rules/text/names.hpp"
 #include "shm/utf8.hpp"
@@ -210,7 +211,7 @@ std::string size_text(std::uint64_t bytes) {
 }
 
 void write_text(std::ostream& out, const RecordingInfo& info) {
-  write_wrapped(out, "file", shm::printable(info.path));
+  out << padded_to("file", kMargin) << shm::printable(info.path) << '\n';
   write_wrapped(out, "size", size_text(info.end.file_bytes));
   write_state(out, info);
   if (!info.library.empty()) write_wrapped(out, "written by", shm::printable(info.library));
@@ -231,7 +232,7 @@ void write_text(std::ostream& out, const RecordingInfo& info) {
   write_attachments(out, info);
   if (info.end.is_whole || !info.has_header) return;
   out << "\nTo make a whole file of what is whole:\n  arbiter recording repair "
-      << shm::printable(info.path) << '\n';
+      << shm::printable(command_line::shell_word(info.path)) << '\n';
 }
 
 }  // namespace arbiter::cli

@@ -28,6 +28,23 @@ const char* name_of(SwitchOutcome outcome) {
   return "left out";
 }
 
+// Why some hosts have not switched, or none has.
+void say_what_lacks(const SwitchEverywhere& result, const std::string& model) {
+  std::cout << std::flush;
+  if (!result.is_committed) {
+    const std::string why = result.hosts.empty()      ? "there is none"
+                            : result.why_none.empty() ? "all must prepare first"
+                                                      : result.why_none;
+    std::cerr << "arbiter: no host has switched to \"" + model + "\": " + why + "\n";
+  } else if (!result.is_whole()) {
+    std::cerr << "arbiter: " << rules::counted(result.count(SwitchOutcome::kNotSwitched), "host")
+              << " not switched, " << result.count(SwitchOutcome::kUnknown)
+              << " unknown; arbiter hosts shows which model is in force on each, as soon as it is "
+                 "heard again: then run arbiter switch \""
+              << model << "\" on those that lack it, or switch all again\n";
+  }
+}
+
 }  // namespace
 
 void write_text(const SwitchEverywhere& result, const std::string& model) {
@@ -43,24 +60,12 @@ void write_text(const SwitchEverywhere& result, const std::string& model) {
     if (!each.why.empty()) std::cout << ": " << each.why;
     std::cout << '\n';
   }
-  std::cout << std::flush;
-  const std::size_t switched = result.count(SwitchOutcome::kSwitched);
-  if (!result.is_committed) {
-    const std::string why = result.hosts.empty()      ? "there is none"
-                            : result.why_none.empty() ? "all must prepare first"
-                                                      : result.why_none;
-    std::cerr << "arbiter: no host has switched to \"" + model + "\": " + why + "\n";
-    return;
+  if (result.is_committed) {
+    std::cout << rules::counted(result.count(SwitchOutcome::kSwitched), "host") << " switched to \""
+              << model << "\" one by one, within " << watch::span_text(result.interval)
+              << " of the first commit\n";
   }
-  std::cout << rules::counted(switched, "host") << " switched to \"" << model
-            << "\" one by one, within " << watch::span_text(result.interval)
-            << " of the first commit\n";
-  if (result.is_whole()) return;
-  std::cerr << "arbiter: " << rules::counted(result.count(SwitchOutcome::kNotSwitched), "host")
-            << " not switched, " << result.count(SwitchOutcome::kUnknown)
-            << " unknown; arbiter hosts shows which model is in force on each, as soon as it is "
-               "heard again: then run arbiter switch \""
-            << model << "\" on those that lack it, or switch all again\n";
+  say_what_lacks(result, model);
 }
 
 void write_json(const SwitchEverywhere& result, const std::string& model) {
@@ -79,6 +84,7 @@ void write_json(const SwitchEverywhere& result, const std::string& model) {
                                      {"ok", result.is_whole()},
                                      {"interval", result.interval},
                                      {"hosts", std::move(hosts)}});
+  say_what_lacks(result, model);
 }
 
 }  // namespace arbiter::cli

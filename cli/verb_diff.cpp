@@ -3,9 +3,11 @@
 #include <iostream>
 #include <memory>
 #include <string>
+#include <system_error>
 
 #include <CLI/CLI.hpp>
 
+#include "cli/answer.hpp"
 #include "cli/model_files.hpp"
 #include "cli/progress.hpp"
 #include "cli/verbs.hpp"
@@ -24,7 +26,8 @@ struct DiffOptions {
 
 // One file, or several that form a model, with commas between them.
 std::vector<std::string> files_of(const std::string& argument) {
-  if (argument.find(',') == std::string::npos || std::filesystem::exists(argument)) {
+  std::error_code too_long;  // together they may be no name of a file
+  if (argument.find(',') == std::string::npos || std::filesystem::exists(argument, too_long)) {
     return {argument};
   }
   return CLI::detail::split(argument, ',');
@@ -85,7 +88,8 @@ void add_diff(CLI::App& app, int& exit_code) {
       "Exit codes: 0 they decide alike in every state; 1 they differ; 2 diff cannot tell, wrong "
       "use,\n"
       "or a file that cannot be opened or written");
-  verb->callback([options, &exit_code] { exit_code = diff(*options); });
+  verb->callback(
+      [options, &exit_code] { exit_code = or_cannot_tell([&] { return diff(*options); }); });
 }
 
 }  // namespace arbiter::cli

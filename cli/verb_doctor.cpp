@@ -1,6 +1,5 @@
 // arbiter doctor: what is wrong around an instance, why it matters, and what to type to mend it.
 #include <algorithm>
-#include <exception>
 #include <filesystem>
 #include <iostream>
 #include <iterator>
@@ -13,6 +12,7 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
+#include "cli/answer.hpp"
 #include "cli/live.hpp"
 #include "cli/progress.hpp"
 #include "cli/verbs.hpp"
@@ -25,8 +25,6 @@ namespace {
 
 using nlohmann::json;
 using watch::Findings;
-
-constexpr int kCannotLook = 2;
 
 struct DoctorOptions {
   std::string instance;
@@ -141,15 +139,8 @@ same user, and in the same place, as your components.
 
 Exit codes: 0 nothing found; 1 findings; 2 wrong use, or it cannot look, or standard output cannot be
 written)");
-  // 1 would mean findings.
-  verb->callback([options, &exit_code] {
-    try {
-      exit_code = examine(*options);
-    } catch (const std::exception& error) {
-      std::cerr << "arbiter: " << shm::printable(error.what(), "\n\t") << '\n';
-      exit_code = kCannotLook;
-    }
-  });
+  verb->callback(
+      [options, &exit_code] { exit_code = or_cannot_tell([&] { return examine(*options); }); });
 }
 
 }  // namespace arbiter::cli

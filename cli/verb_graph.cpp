@@ -26,7 +26,12 @@ int graph(const GraphOptions& options) {
   if (options.follow && options.output.empty()) {
     throw CLI::RequiredError("--output, the file that --follow writes again at each change,");
   }
-  if (options.follow) return draw_and_follow(options);
+  if (options.follow) {
+    require_named_file(options.output,
+                       "--follow writes a file again at each change; give it a name, such as "
+                       "now.svg");
+    return draw_and_follow(options);
+  }
   if (options.live) return draw_live(options);
   if (options.files.models.empty()) throw CLI::RequiredError("MODEL, or --live,");
   return draw_still(options);

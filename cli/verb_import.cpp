@@ -194,6 +194,11 @@ CLI::Validator name_of_topic(const char* what) {
           ""};
 }
 
+CLI::Validator name_of_namespace() {
+  const CLI::Validator name = name_of_topic("namespace");
+  return {[name](std::string& text) { return text == "/" ? std::string() : name(text); }, ""};
+}
+
 CLI::Validator name_of_type() {
   return {[](std::string& text) -> std::string {
             constexpr std::string_view kAllowed =
@@ -234,7 +239,7 @@ void add_names(CLI::App& verb, ImportVerbOptions& options) {
                   "What topics without a slash in front are relative to; without it, what the "
                   "files say, or /")
       ->type_name("NAME")
-      ->check(name_of_topic("namespace"));
+      ->check(name_of_namespace());
   verb.add_option("--output-topic", options.import.output_topic,
                   "Topic of the commands that win; without it, the multiplexer's own: cmd_vel_out, "
                   "cmd_vel, or what the file says")
@@ -249,11 +254,11 @@ void add_names(CLI::App& verb, ImportVerbOptions& options) {
                   "What is sent while nobody commands: zero (stop), none (as the multiplexers "
                   "do), or auto: zero if the type is geometry_msgs/msg/Twist")
       ->type_name("WHAT")
-      ->check(CLI::IsMember({"auto", "zero", "none"}));
+      ->check(one_of({"auto", "zero", "none"}));
   verb.add_option("--domain", options.import.domain,
                   "DDS domain of the topics; without it, ROS_DOMAIN_ID says, as for the nodes")
       ->type_name("NUMBER")
-      ->check(number_between(0, kMaxDomain));
+      ->check(whole_number_between(0, kMaxDomain));
 }
 
 }  // namespace

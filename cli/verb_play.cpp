@@ -5,7 +5,9 @@
 // which the scheduler let us run; so what simulate says of a boundary holds here too.
 #include <algorithm>
 #include <chrono>
+#include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <iostream>
 #include <map>
 #include <memory>
@@ -19,6 +21,7 @@
 
 #include "cli/live.hpp"
 #include "cli/numbers.hpp"
+#include "cli/pub_type.hpp"
 #include "cli/verbs.hpp"
 #include "recorder/speed.hpp"
 #include "rules/ask/report.hpp"
@@ -51,17 +54,23 @@ NodeOptions node_options(const std::string& instance) {
   return options;
 }
 
-// An output port, and its tap: Outcome counts ports, and a tap names them.
+// An output port, and its tap: Outcome counts ports, and a tap names them. Where components want
+// samples of a type, all bytes are zero, which is what a robot stands still by; else it is a number
+// that counts.
 class PlayedSource {
  public:
-  PlayedSource(Node& node, const std::string& name)
-      : output_(node.output_port<std::uint64_t>(name)), tap_(tap_of(node, name)) {
+  PlayedSource(Node& node, const std::string& name, const std::optional<Type>& type)
+      : sample_(type ? type->size() : sizeof(std::uint64_t)),
+        is_number_(!type),
+        output_(node.output_port(name, type.value_or(arbiter::type_of<std::uint64_t>()))),
+        tap_(tap_of(node, name)) {
     output_.require_replay();
   }
 
-  void publish_at(Time at, std::uint64_t value) {
+  void publish_at(Time at, std::uint64_t number) {
     last_.reset();
-    output_.publish_at(at, value);
+    if (is_number_) std::memcpy(sample_.data(), &number, sizeof number);
+    output_.publish_at(at, Bytes(sample_.data(), sample_.size()));
     while (auto event = tap_.take()) {
       if (event->kind() == TapEventKind::sample) last_.emplace(std::move(*event));
     }
@@ -94,7 +103,9 @@ class PlayedSource {
     return node.tap(name, options);
   }
 
-  OutputPort<std::uint64_t> output_;
+  std::vector<std::byte> sample_;
+  const bool is_number_;
+  OutputPort<void> output_;
   Tap<> tap_;
   std::optional<TapEvent<>> last_;  // nothing: the tap has told nothing of the last sample
 };
@@ -102,12 +113,16 @@ class PlayedSource {
 class Player {
  public:
   Player(const PlayOptions& options, const std::vector<rules::TraceEvent>& events)
-      : options_(options), node_("arbiter-play", node_options(options.instance)) {
+      : options_(options),
+        node_("arbiter-play", node_options(options.instance)),
+        instance_(watch_instance("play", options.instance)) {
+    const wire::Status status = instance_->status();
     for (const auto& event : events) {
       if (event.kind == rules::TraceKind::kTick || sources_.count(event.source) != 0) continue;
-      sources_.try_emplace(event.source, node_, event.source);
+      sources_.try_emplace(event.source, node_, event.source,
+                           type_of_receivers(status, event.source));
     }
-    instance_ = watch_instance("play", options.instance);  // which sees what has been opened
+    instance_->update();  // now it sees what has been opened
   }
   Player(const Player&) = delete;
   Player& operator=(const Player&) = delete;
@@ -214,8 +229,8 @@ class Player {
 
   const PlayOptions& options_;
   Node node_;
+  const std::shared_ptr<watch::Instance> instance_;
   std::map<std::string, PlayedSource> sources_;
-  std::shared_ptr<watch::Instance> instance_;
   std::map<std::string, shm::Nanoseconds> deactivated_;  // when last
   shm::Nanoseconds last_ = 0;                            // time of the last event
   std::uint64_t counter_ = 0;
@@ -251,6 +266,8 @@ void add_play(CLI::App& app, int& exit_code) {
   add_instance_option(*verb, options->instance);
   verb->footer(
       "Example:\n  arbiter play trace.csv --speed 2\n\n"
+      "Samples are of the type that the input ports take that are open at the start, and all zero; "
+      "where these\nare untyped or of several types, they are numbers that count.\n\n"
       "The decision says what became of the sample, which play learns from a tap of each source: "
       "the policy\nmust allow `replay` and `tap` of them. Beside delivered and discarded it may "
       "be: "

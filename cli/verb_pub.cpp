@@ -105,6 +105,7 @@ bool check_takers(const PubOptions& options, const Type& type,
 
 int publish(const PubOptions& options, OutputPort<void>& out, const std::vector<std::byte>& payload,
             const shm::FileDescriptor& interrupts) {
+  constexpr shm::Nanoseconds kMostBehind = 1'000'000'000;
   const auto period = static_cast<shm::Nanoseconds>(1e9 / options.rate_hz);
   shm::Nanoseconds next = shm::monotonic_now();
   std::uint64_t published = 0;
@@ -124,6 +125,9 @@ int publish(const PubOptions& options, OutputPort<void>& out, const std::vector<
       if (!std::cout) break;
     }
     next += period;
+    // Who was stopped, or slept with the machine, does not publish all that it has missed at once.
+    const shm::Nanoseconds now = shm::monotonic_now();
+    if (now - next > kMostBehind) next = now;
   }
   std::cout << "published " << rules::counted(published, "sample") << " of "
             << rules::counted(payload.size(), "byte") << ": delivered " << delivered

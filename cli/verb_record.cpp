@@ -17,6 +17,7 @@
 #include "cli/flight_recorder.hpp"
 #include "cli/live.hpp"
 #include "cli/numbers.hpp"
+#include "cli/output_file.hpp"
 #include "cli/port_patterns.hpp"
 #include "cli/recording_info.hpp"
 #include "cli/verbs.hpp"
@@ -108,15 +109,15 @@ evidence::RecordingInfo info_of(const recorder::RecorderOptions& settings) {
   return info;
 }
 
-int record_into_file(const RecordOptions& options, const recorder::RecorderOptions& settings,
-                     shm::Nanoseconds end) {
+int record_into_file(const RecordOptions& options, const recorder::RecorderOptions& settings) {
   const auto interrupts = catch_interrupts();
   recorder::FileSink sink(options.out, {compression_of(options.compression)}, info_of(settings));
   try {
     recorder::Recorder recorder(settings, sink);
     std::cerr << "arbiter: recording " + rules::counted(recorder.taps(), "source") + " into " +
                      options.out + '\n';
-    recorder.run(end, interrupts.get(), [] { return false; });
+    recorder.run(time_after(shm::monotonic_now(), options.duration), interrupts.get(),
+                 [] { return false; });
     const auto recorded = recorder.finish();
     write_summary(recorded, options.out, sink.writer().bytes());
   } catch (const recording::McapError&) {
@@ -129,21 +130,14 @@ int record_into_file(const RecordOptions& options, const recorder::RecorderOptio
 }
 
 int record(RecordOptions& options) {
-  if (options.out == "-") {
-    throw CLI::ValidationError("--output",
-                               "a recording is a file, and cannot go to standard output; give it a "
-                               "name, such as incident.mcap");
-  }
+  require_named_file(options.out, kMustBeFile);
   if (options.is_dump) return dump(options.out, options.patience);
   std::signal(SIGXFSZ, SIG_IGN);  // a file that has become too large is an error as any other
   const auto settings = recorder_options(options);
   warn_of_patterns_without_port(options);
-  const shm::Nanoseconds started = shm::monotonic_now();
-  const shm::Nanoseconds end =
-      options.duration >= shm::kForever - started ? shm::kForever : started + options.duration;
-  if (options.flight.span == 0) return record_into_file(options, settings, end);
+  if (options.flight.span == 0) return record_into_file(options, settings);
   options.flight.prefix = options.out;
-  options.flight.end = end;
+  options.flight.duration = options.duration;
   return fly(options.flight, settings, {compression_of(options.compression)}, info_of(settings));
 }
 

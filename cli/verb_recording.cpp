@@ -4,6 +4,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "cli/answer.hpp"
 #include "cli/recording_export.hpp"
 #include "cli/recording_info.hpp"
 #include "cli/recording_sample.hpp"
@@ -29,8 +30,9 @@ void add_info(CLI::App& parent, int& exit_code) {
       "Example:\n  arbiter recording info incident.mcap\n\n"
       "Exit codes: 0 the file is whole; 1 it is not: what is whole of it is shown; 2 wrong use, or "
       "a file\nthat cannot be opened or is not an MCAP file");
-  verb->callback(
-      [options, &exit_code] { exit_code = show_recording(options->file, options->json); });
+  verb->callback([options, &exit_code] {
+    exit_code = or_cannot_tell([&] { return show_recording(options->file, options->json); });
+  });
 }
 
 void add_repair(CLI::App& parent, int& exit_code) {

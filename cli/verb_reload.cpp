@@ -39,7 +39,7 @@ int reload(const ReloadOptions& options) {
     std::cout << "the policy " << report.policy->file << " differs from the one in force: it has "
               << rules::counted(report.policy->rules, "rule") << '\n';
   }
-  std::cout << "nothing has changed; arbiter reload puts the files in force\n";
+  std::cout << "this was a dry run: arbiter reload puts the files in force\n";
   return 0;
 }
 

@@ -138,11 +138,13 @@ void add_replay(CLI::App& app, int& exit_code) {
       ->group("");
   verb->add_option("--source", options->sources,
                    "Only output ports of this pattern, such as '/Arm/*'; repeatable")
-      ->type_name("PATTERN");
+      ->type_name("PATTERN")
+      ->allow_extra_args(false);  // what follows may be FILE
   verb->add_option("--port", options->ports,
                    "Only sources that input ports of this pattern are connected to, or read; "
                    "repeatable")
-      ->type_name("PATTERN");
+      ->type_name("PATTERN")
+      ->allow_extra_args(false);
   add_instance_option(*verb, options->instance);
   verb->footer(
       "Example:\n"

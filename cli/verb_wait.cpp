@@ -47,10 +47,8 @@ struct WaitOptions {
   bool json = false;
 };
 
-// Some ways of writing shm::kForever are later than any time.
 shm::Nanoseconds end_of(const WaitOptions& options, shm::Nanoseconds started) {
-  const shm::Nanoseconds span = options.timeout.value_or(shm::kForever);
-  return span >= shm::kForever - started ? shm::kForever : started + span;
+  return time_after(started, options.timeout.value_or(shm::kForever));
 }
 
 // The instance; with --timeout, one whose daemon comes in time. Null: interrupted meanwhile.
@@ -129,7 +127,7 @@ class Waiting {
                                             shm::Nanoseconds now) const {
     shm::Nanoseconds next = shm::kForever;
     if (look.truth != Truth::kUnknown) next = std::max(look.picture.next_end(), now);
-    if (held_since_) next = std::min(next, *held_since_ + options_.hold);
+    if (held_since_) next = std::min(next, time_after(*held_since_, options_.hold));
     return next;
   }
 

@@ -35,22 +35,31 @@ bool read_number(const std::string& text, Number& value) {
   return read.ec == std::errc() && read.ptr == end;
 }
 
+// Empty: it is one. What has a zero in front CLI11 would take for an octal number.
+inline std::string problem_of_whole_number(const std::string& text, std::uint64_t least,
+                                           std::uint64_t most, const std::string& range) {
+  std::uint64_t value = 0;
+  if (!read_number(text, value) || value < least || value > most) {
+    return '"' + text + "\" is not a whole number " + range;
+  }
+  const std::string plain = std::to_string(value);
+  return text == plain ? "" : '"' + text + "\" has a zero in front; write " + plain;
+}
+
 // CLI::PositiveNumber would tell the bounds of a double, in all their digits.
-inline CLI::Validator at_least_one() {
-  return {[](std::string& text) -> std::string {
-            std::uint64_t value = 0;
-            if (read_number(text, value) && value >= 1) return "";
-            return '"' + text + "\" is not a whole number of at least 1";
+inline CLI::Validator at_least(std::uint64_t least) {
+  return {[least](std::string& text) {
+            return problem_of_whole_number(text, least, UINT64_MAX,
+                                           "of at least " + std::to_string(least));
           },
           ""};
 }
+inline CLI::Validator at_least_one() { return at_least(1); }
 
 inline CLI::Validator whole_number_between(std::uint64_t least, std::uint64_t most) {
-  return {[least, most](std::string& text) -> std::string {
-            std::uint64_t value = 0;
-            if (read_number(text, value) && value >= least && value <= most) return "";
-            return '"' + text + "\" is not a whole number from " + std::to_string(least) + " to " +
-                   std::to_string(most);
+  return {[least, most](std::string& text) {
+            return problem_of_whole_number(
+                text, least, most, "from " + std::to_string(least) + " to " + std::to_string(most));
           },
           ""};
 }

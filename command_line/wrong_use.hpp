@@ -212,16 +212,31 @@ inline std::string text_of_missing(const CLI::App& verb, const std::string& miss
   return missing + meant(verb, words, option.starts_with("--") ? option : "");
 }
 
-// As CLI11 says it, "--silence: 1 required CODE missing"; another text stays as it is.
-inline std::string text_of_missing_value(const std::string& text) {
+// What CLI11 says of values: "--silence: 1 required CODE missing", "--rate: At Most 1 required but
+// received 2"; another text stays as it is.
+inline std::string text_of_value(const std::string& text) {
   constexpr std::string_view kBefore = ": 1 required ";
   constexpr std::string_view kBehind = " missing";
+  constexpr std::string_view kTooMany = ": At Most 1 required but received ";
+  if (const std::size_t at = text.find(kTooMany); at != std::string::npos) {
+    return text.substr(0, at) + " is given " + text.substr(at + kTooMany.size()) +
+           " times; give it once";
+  }
   const std::size_t at = text.find(kBefore);
   if (at == std::string::npos || !text.ends_with(kBehind)) return text;
   const std::string option = text.substr(0, at);
   const std::size_t begin = at + kBefore.size();
   return option + " needs a value; write: " + option + ' ' +
          text.substr(begin, text.size() - kBehind.size() - begin);
+}
+
+// As CLI11 says it, "Could not convert: --json = maybe": of numbers its checks have spoken before.
+inline std::string text_of_flag_value(const std::string& text) {
+  const std::size_t name = text.find(": ") + 2;
+  const std::size_t value = text.find(" = ", name);
+  if (value == std::string::npos) return text;
+  return text.substr(name, value - name) + " takes no value; leave out " +
+         rules::quote("=" + text.substr(value + 3));
 }
 
 // The first example that the verb's help has, to be put behind what lacks something else that would
@@ -251,7 +266,9 @@ inline std::string text_of(const CLI::Error& error, const Typed& typed,
     if (lacks_verb(verb)) return text_of_missing_verb(verb, typed.name);
     text = text_of_missing(verb, text);
   } else {
-    return is(CLI::ExitCodes::ArgumentMismatch) ? text_of_missing_value(text) : text;
+    return is(CLI::ExitCodes::ArgumentMismatch)  ? text_of_value(text)
+           : is(CLI::ExitCodes::ConversionError) ? text_of_flag_value(text)
+                                                 : text;
   }
   return text.ends_with('?') ? text : text + example_of(verb);
 }

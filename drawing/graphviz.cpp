@@ -2,6 +2,7 @@
 
 #include <fcntl.h>
 #include <poll.h>
+#include <signal.h>
 #include <spawn.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -35,6 +36,29 @@ struct FileActions {
   FileActions(const FileActions&) = delete;
   FileActions& operator=(const FileActions&) = delete;
   posix_spawn_file_actions_t actions{};
+};
+
+// Ends with this, unless somebody has waited for its end.
+class Child {
+ public:
+  explicit Child(pid_t pid) : pid_(pid) {}
+  ~Child() {
+    if (pid_ < 0) return;
+    kill(pid_, SIGKILL);
+    static_cast<void>(wait());
+  }
+  Child(const Child&) = delete;
+  Child& operator=(const Child&) = delete;
+  [[nodiscard]] int wait() {
+    int status = 0;
+    while (waitpid(pid_, &status, 0) < 0 && errno == EINTR) {
+    }
+    pid_ = -1;
+    return status;
+  }
+
+ private:
+  pid_t pid_;
 };
 
 pid_t start(const std::string& format, const Pipe& in, const Pipe& out, const Pipe& err) {
@@ -92,16 +116,14 @@ void exchange(std::string_view input, Pipe& in, std::string& output, Pipe& out, 
 
 Layout lay_out(const std::string& dot, const std::string& format, const Waiting& waiting) {
   Pipe in, out, err;
-  const pid_t child = start(format, in, out, err);
+  Child child(start(format, in, out, err));
   in.read.reset();
   out.write.reset();
   err.write.reset();
   std::string picture, errors;
   exchange(dot, in, picture, out, errors, err, waiting);
   in.write.reset();
-  int status = 0;
-  while (waitpid(child, &status, 0) < 0 && errno == EINTR) {
-  }
+  const int status = child.wait();
   if (!WIFEXITED(status) || WEXITSTATUS(status) != 0 || picture.empty()) {
     throw std::runtime_error("dot could not draw this: " + errors);
   }

@@ -7,7 +7,8 @@
 
 namespace arbiter::drawing {
 
-// Whom to tell while dot is at work, which takes minutes for hundreds of behaviours.
+// Whom to tell while dot is at work, which takes minutes for hundreds of behaviours. If tell()
+// throws, dot is ended.
 struct Waiting {
   std::function<void()> tell = [] {};
   std::chrono::milliseconds period{100};  // of silence

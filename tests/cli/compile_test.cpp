@@ -57,6 +57,24 @@ TEST(Compile, MakesAnApplicationOfTheConnectionsThatAreConfigured) {
   EXPECT_EQ(arbiter({"check", out}).out, "ok: 1 port, 2 connections, 2 sources\n");
 }
 
+TEST(Compile, WritesAlsoWhereTheNameHasNoRoomForMoreAndWhereALinkLeads) {
+  const TemporaryDirectory directory;
+  const auto model = directory.write("m.xml", kOverrideModel);
+  const std::string longest = directory.path() + "/" + std::string(255, 'n');
+  EXPECT_EQ(arbiter({"compile", model, "-o", longest}).err, "");
+  EXPECT_THAT(content_of(longest), HasSubstr("<arbitration"));
+  std::filesystem::create_directory(directory.path() + "/to");
+  const std::string link = directory.path() + "/link.xml";
+  std::filesystem::create_symlink("to/second.xml", link);
+  std::filesystem::create_symlink("new.xml", directory.path() + "/to/second.xml");
+  for (int i = 0; i < 2; ++i) {  // where nothing is there yet, and again
+    EXPECT_EQ(arbiter({"compile", model, "-o", link}).err, "");
+    EXPECT_TRUE(std::filesystem::is_symlink(link));
+    EXPECT_TRUE(std::filesystem::is_regular_file(
+        std::filesystem::symlink_status(directory.path() + "/to/new.xml")));
+  }
+}
+
 TEST(Compile, RefusesToOverwriteWhatItReads) {
   const TemporaryDirectory directory;
   const auto model = directory.write("m.xml", kOverrideModel);

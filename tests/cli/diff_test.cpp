@@ -66,6 +66,18 @@ TEST_F(Diff, AModelMayHaveSeveralFiles) {
   EXPECT_EQ(arbiter({"diff", both, low}).exit_code, 1);
 }
 
+// With 1 it would say that they differ.
+TEST_F(Diff, AModelMayHaveFilesWhoseNamesTogetherAreNoName) {
+  directory_.write("both.xml", low_ + high_);
+  const std::string low = std::string(150, 'l'), high = std::string(150, 'h');
+  directory_.write(low, low_);
+  directory_.write(high, high_);
+  const auto result =
+      run_program({"/usr/bin/env", "-C", directory_.path(), ARBITER_PROGRAMS "/arbiter", "diff",
+                   "both.xml", low + "," + high});
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+}
+
 TEST_F(Diff, EachModelMayHaveItsApplication) {
   const auto model = directory_.write("m.xml", low_);
   const auto connection = [](const std::string& source) {

@@ -254,6 +254,25 @@ TEST(Graph, RefusesToOverwriteTheModel) {
   EXPECT_EQ(content_of(model), kOverrideModel);
 }
 
+TEST(Graph, RefusesToOverwriteTheApplicationThatSaysWhereThingsRun) {
+  const TemporaryDirectory directory;
+  const auto model = directory.write("m.xml", kOverrideModel);
+  const std::string text = "<application><name>x</name></application>";
+  const auto hosts = directory.write("hosts.dot", text);
+  const auto result = arbiter({"graph", model, "--hosts", hosts, "-o", hosts});
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_THAT(result.err, HasSubstr("--output " + hosts + " would overwrite the input"));
+  EXPECT_EQ(content_of(hosts), text);
+}
+
+TEST(Graph, FollowsIntoAFileOnly) {
+  for (const char* output : {"-", "/dev/stdout"}) {
+    const auto result = arbiter({"graph", "--follow", "-o", output});
+    EXPECT_EQ(result.exit_code, 2);
+    EXPECT_THAT(result.err, HasSubstr("--follow writes a file again at each change"));
+  }
+}
+
 TEST(Graph, SaysWhichFileCannotBeWritten) {
   const TemporaryDirectory directory;
   const auto result = arbiter({"graph", directory.write("m.xml", kOverrideModel), "-o",

@@ -105,6 +105,14 @@ TEST(Import, IsRefusedWhereItIsUsedWrongly) {
   EXPECT_EQ(content_of(yaml), kMux);
 }
 
+TEST(Import, TheNamespaceMayBeTheOneThatThePageNames) {
+  TemporaryDirectory directory;
+  const auto yaml = directory.write("mux.yaml", kMux);
+  const auto named = arbiter({"import", "twist_mux", yaml, "--namespace", "/"});
+  EXPECT_EQ(named.exit_code, 0) << named.err;
+  EXPECT_EQ(named.out, arbiter({"import", "twist_mux", yaml}).out);
+}
+
 // Somebody may have changed them by hand.
 TEST(Import, ReplacesNoFileUnlessItIsToldTo) {
   TemporaryDirectory directory;

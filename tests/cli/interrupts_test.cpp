@@ -2,8 +2,10 @@
 // end of their own, and are stopped before it, are in play_test.cpp and wait_test.cpp.
 #include <fcntl.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <csignal>
+#include <cstdlib>
 #include <filesystem>
 #include <string>
 #include <thread>
@@ -13,6 +15,7 @@
 #include "tests/support/child_process.hpp"
 #include "tests/support/daemon.hpp"
 #include "tests/support/temporary_directory.hpp"
+#include "tests/support/text_files.hpp"
 
 namespace arbiter::test {
 namespace {
@@ -45,6 +48,29 @@ TEST(Interrupts, EndAVerbThatGoesOnUntilThenInGoodOrder) {
       EXPECT_EQ(process.wait(), 0) << verb.front() << " at signal " << signal;
       std::filesystem::remove(files.path() + "/r.mcap");
     }
+  }
+}
+
+// Which takes minutes for hundreds of behaviours.
+TEST(Interrupts, EndAPictureThatIsFollowedAlsoWhileGraphvizIsAtWork) {
+  Daemon daemon("<behaviors><arbiter at='/p'><select from='/s'/></arbiter></behaviors>");
+  const TemporaryDirectory files;
+  const std::string started = files.path() + "/started", gate = files.path() + "/gate";
+  ASSERT_EQ(::mkfifo(gate.c_str(), 0600), 0);
+  const std::string dot =
+      files.write("dot", "#!/bin/sh\necho $$ > " + started + ".new\nmv " + started + ".new " +
+                             started + "\nread line < " + gate + "\n");
+  std::filesystem::permissions(dot, std::filesystem::perms::owner_all);
+  const std::string path = files.path() + ":" + std::getenv("PATH");
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
+    std::filesystem::remove(started);
+    ChildProcess process(
+        {ARBITER_PROGRAMS "/arbiter", "graph", "--follow", "-o", files.path() + "/now.svg"},
+        {{"PATH", path}}, {});
+    while (!std::filesystem::exists(started)) std::this_thread::yield();
+    process.signal(signal);
+    EXPECT_EQ(process.wait(), 0) << signal;
+    EXPECT_EQ(::kill(std::stoi(content_of(started)), 0), -1) << "Graphviz goes on";
   }
 }
 

@@ -160,13 +160,15 @@ void read_until(const shm::FileDescriptor& pipe, const std::string& text) {
 }
 
 // `err`: where what it says can be read.
-ChildProcess follow(const std::string& path, shm::FileDescriptor& err) {
+ChildProcess follow(const std::string& path, shm::FileDescriptor& err,
+                    const std::vector<std::string>& more = {}) {
   int ends[2];
   if (::pipe2(ends, O_CLOEXEC) != 0) throw std::runtime_error("pipe2");
   err.reset(ends[0]);
   const shm::FileDescriptor their_err(ends[1]);
-  return ChildProcess({ARBITER_PROGRAMS "/arbiter", "graph", "--follow", "-o", path}, {},
-                      {-1, -1, their_err.get()});
+  std::vector<std::string> verb{ARBITER_PROGRAMS "/arbiter", "graph", "--follow", "-o", path};
+  verb.insert(verb.end(), more.begin(), more.end());
+  return ChildProcess(verb, {}, {-1, -1, their_err.get()});
 }
 
 // It has asked the daemon before it draws, and has given up.
@@ -206,6 +208,23 @@ TEST(LiveGraph, SaysThatTheDaemonHasGoneAndFollowsTheNext) {
     <behavior name="Next"><config at="/p">/high</config></behavior></behaviors>)");
   daemon.restart();
   wait_for_picture(path, "○ Next");
+  follower.signal(SIGINT);
+  EXPECT_EQ(follower.wait(), 0);
+}
+
+TEST(LiveGraph, KeepsThePictureOfAPortThatAModelLacks) {
+  Daemon daemon(kLowAndHigh);
+  const TemporaryDirectory directory;
+  const auto path = directory.path() + "/now.dot";
+  shm::FileDescriptor err;
+  ChildProcess follower = follow(path, err, {"--port", "/p"});
+  wait_for_picture(path, "○ Low");
+  daemon.load(R"(<behaviors><behavior name="Other"><config at="/q">/low</config></behavior>
+    </behaviors>)");
+  read_until(err, "the model has no input port /p");
+  daemon.load(R"(<behaviors timeout="3600s">
+    <behavior name="Again"><config at="/p">/low</config></behavior></behaviors>)");
+  wait_for_picture(path, "○ Again");
   follower.signal(SIGINT);
   EXPECT_EQ(follower.wait(), 0);
 }

@@ -55,7 +55,8 @@ TEST(Play, DecidesAsSimulateSays) {
 TEST(Play, SaysOfAPortThatNobodyHasOpenThatNothingIsDelivered) {
   Daemon daemon(kPlayedModel);
   Node node("test");
-  auto r = node.input_port<double>("/r");  // of another type
+  auto r =
+      node.input_port("/r", Type::variable("text", 64));  // of samples that play cannot make up
   const TemporaryDirectory files;
   const auto played = arbiter(
       {"play", files.write("trace.csv", "t_ns,source,event\n0,/low,\n1,/low,deactivate\n")});
@@ -67,6 +68,37 @@ TEST(Play, SaysOfAPortThatNobodyHasOpenThatNothingIsDelivered) {
             "t_ns,source,destination,decision,winner\n"
             "0,/low,/p,not open,/low\n0,/low,/r,refused,/low\n"
             "1,/low,/p,-,-\n1,/low,/r,-,-\n");
+}
+
+// Of a command, all zeros are what a robot stands still by.
+TEST(Play, SendsZerosOfTheTypeThatComponentsTake) {
+  Daemon daemon(kPlayedModel);
+  Node node("test");
+  auto p = node.input_port<double>("/p");
+  auto r = node.input_port("/r");
+  const TemporaryDirectory files;
+  const auto trace = files.write("trace.csv", "t_ns,source\n0,/low\n");
+  const auto played = arbiter({"play", trace});
+  EXPECT_EQ(played.exit_code, 0) << played.err;
+  EXPECT_EQ(played.out,
+            "t_ns,source,destination,decision,winner\n"
+            "0,/low,/p,delivered,/low\n0,/low,/r,delivered,/low\n");
+  const auto sample = p.take();
+  ASSERT_TRUE(sample);
+  EXPECT_EQ(**sample, 0.0);
+}
+
+TEST(Play, ChoosesNoneOfSeveralTypes) {
+  Daemon daemon(kPlayedModel);
+  Node node("test");
+  auto p = node.input_port<double>("/p");
+  auto r = node.input_port<float>("/r");
+  const TemporaryDirectory files;
+  const auto played = arbiter({"play", files.write("trace.csv", "t_ns,source\n0,/low\n")});
+  EXPECT_EQ(played.exit_code, 0);
+  EXPECT_EQ(played.out,
+            "t_ns,source,destination,decision,winner\n"
+            "0,/low,/p,refused,/low\n0,/low,/r,refused,/low\n");
 }
 
 TEST(Play, SaysOfAFullQueueThatItRefusesAndWhere) {

@@ -155,5 +155,16 @@ TEST(RecordedIncident, SaysWhatWasTyped) {
                 R"( --duration 20ms --port '/p*' --port '/don'\''t*')");
 }
 
+// However long it takes until it can begin.
+TEST(RecordedIncident, LastsAsLongAsItIsToldTo) {
+  Daemon daemon(kLasting);
+  const std::string file = daemon.directory() + "/long.mcap";
+  const auto result = arbiter({"record", "-o", file, "--duration", "200ms"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const std::size_t at = result.out.find(" in ");
+  ASSERT_NE(at, std::string::npos) << result.out;
+  EXPECT_GE(std::stod(result.out.substr(at + 4)), 0.2) << result.out;
+}
+
 }  // namespace
 }  // namespace arbiter::test

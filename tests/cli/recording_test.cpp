@@ -195,6 +195,35 @@ TEST_F(RecordingVerb, ExitsWith2WhereThereIsNothingToRead) {
   }
 }
 
+TEST_F(RecordingVerb, AreNotWrittenToStandardOutput) {
+  const std::string path = cut();
+  for (const std::vector<std::string>& verb :
+       {std::vector<std::string>{"recording", "repair", path}, {"record"}}) {
+    for (const char* output : {"-", "/dev/stdout"}) {
+      std::vector<std::string> arguments = verb;
+      arguments.insert(arguments.end(), {"-o", output});
+      const auto result = arbiter(arguments);
+      EXPECT_EQ(result.exit_code, 2);
+      EXPECT_THAT(result.err, HasSubstr("a recording is a file, and cannot go to standard output"));
+    }
+  }
+}
+
+TEST_F(RecordingVerb, NamesFilesSoThatTheyCanBePastedAndObeysNothingInThem) {
+  const std::string path = directory_.file("my  \x1b[31m cut.mcap");
+  std::filesystem::rename(cut(), path);
+  const std::string shown = directory_.file("my  \\x1b[31m cut");
+  const auto info = arbiter({"recording", "info", path}).out;
+  EXPECT_THAT(info, HasSubstr("file          " + shown + ".mcap\n"));
+  EXPECT_THAT(info, HasSubstr("\n  arbiter recording repair '" + shown + ".mcap'\n"));
+  const auto repaired = arbiter({"recording", "repair", path});
+  EXPECT_THAT(repaired.out, HasSubstr("wrote " + shown + ".repaired.mcap: "));
+  const std::string whole = directory_.file("my  \x1b[31m cut.repaired.mcap");
+  EXPECT_THAT(arbiter({"recording", "repair", whole}).out,
+              HasSubstr(shown + ".repaired.mcap is whole"));
+  EXPECT_THAT(arbiter({"recording", "export", path, "--csv", "-"}).err, Not(HasSubstr("\x1b")));
+}
+
 TEST_F(RecordingVerb, LeavesNothingOfARepairForWhichThereIsNoRoom) {
   const std::string to = directory_.file("new.mcap");
   const std::string path = cut();

@@ -287,5 +287,23 @@ TEST(SwitchEverywhere, WhereAllHaveAnsweredNobodyIsLookedAt) {
   EXPECT_EQ(hosts.looks, 0);
 }
 
+// Of JSON as well: its hosts do not say so.
+TEST(SwitchEverywhere, SaysWhyNoneHasSwitched) {
+  FakeHosts hosts;
+  hosts.answers = {{"prepare", {yes("camera")}}, {"release", {}}};
+  wire::SwitchRequest request = kRequest;
+  request.without = {"camra"};
+  const auto result = hosts.run(request);
+  for (const auto write : {write_text, write_json}) {
+    testing::internal::CaptureStdout();
+    testing::internal::CaptureStderr();
+    write(result, "dance");
+    testing::internal::GetCapturedStdout();
+    EXPECT_THAT(testing::internal::GetCapturedStderr(),
+                HasSubstr("no host has switched to \"dance\": --without camra: no host of that "
+                          "name is known; did you mean \"camera\"?"));
+  }
+}
+
 }  // namespace
 }  // namespace arbiter::cli

@@ -237,6 +237,18 @@ TEST(WhyNames, ASourceIsNotToldThatItWouldWinWhereItsOwnActivityForbidsIt) {
   EXPECT_THAT(why({"/base", "/Nav/vel:o"}), HasSubstr("would select it, if it were active"));
 }
 
+// As the README opens a motor's port.
+TEST(WhyNames, WhoKeepsTheNewestAloneLosesTheOthersOnPurpose) {
+  Daemon daemon(kMisnamed);
+  Node node("test");
+  auto wander = node.output_port<int>("/wander");
+  auto in = node.input_port<int>("/base", {.depth = 1});
+  for (int i = 0; i < 3; ++i) wander.publish(i);
+  EXPECT_THAT(why({"/base", "/wander"}),
+              HasSubstr("\n  2 samples have been lost to newer ones since the ports were opened, "
+                        "because the queue keeps the newest alone (depth 1)\n"));
+}
+
 TEST(WhyNames, CountsAsWaitingNoMoreThanThereIsRoomFor) {
   Daemon daemon(kMisnamed);
   Node node("test");

@@ -20,6 +20,8 @@ TEST(Program, SuggestsTheVerbThatWasMeant) {
   const auto other = arbiter({"explain", "/Arm/pos:i"});
   EXPECT_EQ(other.exit_code, 2);
   EXPECT_EQ(other.err, "arbiter: there is no verb \"explain\"; did you mean \"why\"?\n");
+  // By its letters it would be switch, which changes the robot.
+  EXPECT_THAT(arbiter({"watch"}).err, HasSubstr("did you mean \"top\"?"));
   EXPECT_THAT(arbiter({"frobnicate"}).err, HasSubstr("`arbiter --help` lists"));
 }
 
@@ -177,6 +179,36 @@ TEST(Program, SaysThatOptionsGoAfterTheVerb) {
   EXPECT_THAT(error({"--instance", "newcomer"}),
               HasSubstr("write: arbiter VERB --instance newcomer\n"));
   EXPECT_THAT(error({"--frob", "status"}), testing::Not(HasSubstr("go after it")));
+}
+
+TEST(Program, SaysInWordsOfItsOwnWhatIsWrongWithAValue) {
+  const auto error = [](const std::vector<std::string>& arguments) {
+    const auto result = arbiter(arguments);
+    EXPECT_EQ(result.exit_code, 2) << arguments.front();
+    return result.err.substr(0, result.err.find('\n'));
+  };
+  EXPECT_EQ(error({"status", "--json=maybe"}), "--json takes no value; leave out \"=maybe\"");
+  EXPECT_EQ(error({"pub", "/p", "--rate", "1", "--rate", "2"}),
+            "--rate is given 2 times; give it once");
+  for (const std::string number : {"-1", "0x5", "18446744073709551616"}) {
+    EXPECT_EQ(error({"recording", "sample", "x.mcap", "--source", "/a", "--sequence", number}),
+              "--sequence: \"" + number + "\" is not a whole number of at least 0");
+  }
+  // To CLI11 it is eight.
+  EXPECT_EQ(error({"rollback", "010"}), "GENERATION: \"010\" has a zero in front; write 10");
+  EXPECT_EQ(error({"import", "twist_mux", "x.yaml", "--domain", "010"}),
+            "--domain: \"010\" has a zero in front; write 10");
+  EXPECT_EQ(error({"import", "twist_mux", "x.yaml", "--domain", "1.5"}),
+            "--domain: \"1.5\" is not a whole number from 0 to 230");
+  EXPECT_EQ(error({"import", "twist_mux", "x.yaml", "--idle", "stop"}),
+            "--idle: \"stop\" is not auto, zero or none");
+}
+
+TEST(Program, TakesAFileBehindARepeatableOptionForWhatItIs) {
+  for (const char* option : {"--port", "--source"}) {
+    EXPECT_EQ(arbiter({"replay", option, "/p", "/no-such.mcap", "--speed", "2"}).err,
+              "arbiter: cannot open /no-such.mcap: No such file or directory\n");
+  }
 }
 
 }  // namespace
