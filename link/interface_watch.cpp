@@ -72,7 +72,7 @@ std::vector<std::string> InterfaceWatch::there() const {
   std::vector<std::string> all;
   for (const std::string& each : interfaces_) {
     const auto place = places_.find(each);
-    if (place != places_.end() && place->second.address != 0) all.push_back(each);
+    if (place != places_.end() && place->second.is_usable()) all.push_back(each);
   }
   return all;
 }
@@ -109,7 +109,9 @@ std::string InterfaceWatch::change() {
   const bool was_gone = std::exchange(was_gone_, false);
   for (const auto& [name, place] : *now) {
     const Place& before = places_[name];
-    if (place == before) continue;
+    // One that goes down and comes up is joined all the while, unless it was down at the beginning.
+    const bool is_new = place.is_usable() && !before.is_usable();
+    if (place == before && !is_new) continue;
     if (place.index == 0) return "the network interface " + name + " has gone";
     if (place.address == 0) return "the network interface " + name + " has no address any more";
     const bool is_other = before.address != 0 && place.index != before.index;
@@ -132,7 +134,7 @@ std::optional<InterfaceWatch::Places> InterfaceWatch::look() const {
     for (const std::string& name : {std::string(each->ifa_name), address_text(address)}) {
       const auto ours = places.find(name);
       if (ours == places.end() || ours->second.address != 0) continue;
-      ours->second = {::if_nametoindex(each->ifa_name), address};
+      ours->second = {::if_nametoindex(each->ifa_name), address, (each->ifa_flags & IFF_UP) != 0};
     }
   }
   return places;
@@ -167,7 +169,7 @@ bool InterfaceWatch::is_loss_of_ours(const void* message) const {
   if (header->nlmsg_type == RTM_DELLINK && header->nlmsg_len >= NLMSG_LENGTH(sizeof(ifinfomsg))) {
     const auto* const gone = static_cast<const ifinfomsg*>(NLMSG_DATA(header));
     return std::any_of(places_.begin(), places_.end(), [&](const auto& each) {
-      return static_cast<int>(each.second.index) == gone->ifi_index;
+      return each.second.address != 0 && static_cast<int>(each.second.index) == gone->ifi_index;
     });
   }
   if (header->nlmsg_type != RTM_DELADDR || header->nlmsg_len < NLMSG_LENGTH(sizeof(ifaddrmsg))) {

@@ -26,7 +26,7 @@ class InterfaceWatch {
   // They are what they are now. Call it before joining: nothing that happens from then on is
   // missed.
   void begin();
-  // Those of them that were there then, and had an address.
+  // Those of them that were there then, were up and had an address.
   [[nodiscard]] std::vector<std::string> there() const;
   // Which of them was not there then, and which there are instead, as a sentence; empty: all were.
   [[nodiscard]] std::string missing() const;
@@ -39,6 +39,9 @@ class InterfaceWatch {
   struct Place {
     unsigned index = 0;
     std::uint32_t address = 0;
+    bool is_up = false;
+    // For DDS to join by.
+    [[nodiscard]] bool is_usable() const noexcept { return is_up && address != 0; }
     // To DDS, for which one without an address is none.
     friend bool operator==(const Place& one, const Place& other) noexcept {
       return one.address == other.address && (one.index == other.index || one.address == 0);

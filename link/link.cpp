@@ -85,10 +85,14 @@ Link::~Link() {
 
 template <class Step>
 void Link::while_seen(const Step& step) const {
-  TokenClock rounds([this, left = kMostRoundsOfWaiting]() mutable {
-    if (left-- > 0) options_.on_round();
-  });
-  rounds.set_period(kRoundOfWaiting);
+  std::optional<TokenClock> rounds;
+  try {
+    rounds.emplace([this, left = kMostRoundsOfWaiting]() mutable {
+      if (left-- > 0) options_.on_round();
+    });
+    rounds->set_period(kRoundOfWaiting);
+  } catch (const std::system_error&) {  // there is no thread left: then nobody sees it
+  }
   step();
 }
 
@@ -191,7 +195,7 @@ void Link::join_network(int stop) {
       words.tell();  // of peers that have no address, for example
     } catch (const DdsError& error) {
       leave_network();
-      std::string why = interfaces_.missing();
+      std::string why = interfaces_.there().empty() ? interfaces_.missing() : std::string();
       if (why.empty()) why = words.last().empty() ? error.what() : "DDS: " + words.last();
       say_once(said_, why + "; trying again");
       view_.update([] {});  // for whoever asks what is wrong
@@ -208,8 +212,9 @@ void Link::join_network(int stop) {
   } else if (there.interfaces.size() == options_.network.interfaces.size()) {
     say(Level::kInfo, text);
   } else {
-    say(Level::kWarning, text + " alone: of " + name_of(options_.network) +
-                             " (--interface), the rest is not there now, or has no address");
+    say(Level::kWarning,
+        text + " alone: of " + name_of(options_.network) +
+            " (--interface), the rest is not there now, is down, or has no address");
   }
 }
 

@@ -203,13 +203,15 @@ bool LogWriter::wait(std::chrono::milliseconds limit) {
 
 bool LogWriter::finish(std::chrono::milliseconds limit) {
   std::unique_lock lock(shared_->mutex);
-  // A thread that was left is writing still: no other may take what it has to say.
-  if (std::exchange(shared_->is_ending, true) && !thread_.joinable()) return shared_->is_done();
+  // Then it writes still: no other thread may take what it has to say.
+  if (is_left_) return shared_->is_done();
   if (!shared_->is_done()) start();
+  shared_->is_ending = true;
   shared_->changed.notify_all();
   if (!thread_.joinable()) return shared_->is_done();
   const bool is_done = shared_->changed.wait_for(lock, limit, [&] { return shared_->has_ended; });
   lock.unlock();
+  is_left_ = !is_done;
   is_done ? thread_.join() : thread_.detach();
   return is_done;
 }

@@ -63,6 +63,7 @@ class LogWriter {
   const bool needs_reader_;
   std::shared_ptr<Shared> shared_;  // the thread's too: it may outlive this
   std::thread thread_;
+  bool is_left_ = false;  // to write by itself
 };
 
 }  // namespace arbiter::logging

@@ -26,14 +26,13 @@ void Watcher::ask_daemon() {
   try {
     if (memory_->tables().generation() != generation_) take_up_model();
     look_at_ports();
-    if (std::exchange(may_not_observe_, false)) options_.say("this user may observe again");
+    if (std::exchange(may_not_observe_, false)) options_.say("the daemon tells again");
   } catch (const wire::RefusedError& error) {
     last_ports_ = 0;
     next_question_ = now + kPortsAtLeastEvery;
     if (std::exchange(may_not_observe_, true)) return;
     options_.say(std::string("what is new of models, sources and ports may be missing in the "
-                             "recording, for this user may not observe any more; it is tried "
-                             "again: ") +
+                             "recording, for the daemon refuses to tell; it is tried again: ") +
                  error.what());
   }
 }

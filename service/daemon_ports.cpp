@@ -1,5 +1,6 @@
 // Ports that open and are introduced to their peers; sources that an operator deactivates.
 #include <memory>
+#include <set>
 #include <stdexcept>
 #include <utility>
 
@@ -32,6 +33,10 @@ Client* Daemon::find_holder(const Client& asking, shm::PortInstance holder) {
     return nullptr;
   }
   if (!client->has_gone()) return client;
+  // What it has closed itself did not die with it.
+  for (const shm::PortInstance port : std::set(client->ports)) {
+    if (client->take_closing_of(port)) close_port(*client, port);
+  }
   drop(client->id());  // for one that is only dying yet its names are kept a moment longer
   return nullptr;
 }

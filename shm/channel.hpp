@@ -275,6 +275,17 @@ class ChannelReader {
     const bool may_be_ours = receiver == self_ || receiver == 0;
     return may_be_ours && first == first_ ? end : (first - 1) & kSequenceMask;
   }
+  // Whether all that lies before that was this queue's, to be asked after it: no other has begun in
+  // the segment since this one was joined; or one has, in this channel. Relaxed is enough: who sees
+  // what another queue has accepted sees it begun. A second one that begins at this very moment may
+  // be missed: then what the first one had is counted, too.
+  [[nodiscard]] bool is_last_end_sure() const noexcept {
+    if (state_ != State::kJoined && state_ != State::kLeft) return false;
+    const std::uint64_t begun =
+        segment_.header().joins.load(std::memory_order_relaxed) - seen_joins_;
+    const std::uint64_t first = channel_->first.load(std::memory_order_relaxed) & kSequenceMask;
+    return begun == 0 || (begun == 1 && first != first_);
+  }
   // How many entries are not consumed, given that end: those that wait, and those that were
   // overtaken before they were looked at.
   [[nodiscard]] std::uint64_t unread(std::uint64_t end) const noexcept {

@@ -86,7 +86,10 @@ void InputCore::retire_queue(Queue& queue, const InputView& next) {
     const std::uint64_t end = queue.reader.last_end();
     const std::uint64_t waiting = queue.reader.backlog(end);
     count(counters.dropped, waiting);
-    count(counters.overtaken, queue.reader.unread(end) - waiting);
+    // What several later queues have had in this channel was never ours.
+    if (queue.reader.is_last_end_sure()) {
+      count(counters.overtaken, queue.reader.unread(end) - waiting);
+    }
   }
   if (queue.peer->held != 0) {
     auto kept = std::make_unique<InputView>();

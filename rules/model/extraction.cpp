@@ -70,10 +70,10 @@ class Extraction {
 
   void expand_conditions() {
     // A model with too many sources is refused: no quantifier of it is worth going through them.
-    static const std::vector<std::string> kNoSources;
+    const std::vector<std::string> none;
     const bool is_refused = rules_.sources.size() > shm::kMaxSources;
     gives_advice_ = gives_advice_ && !is_refused;
-    QuantifierExpansion expansion(is_refused ? kNoSources : rules_.sources);
+    QuantifierExpansion expansion(is_refused ? none : rules_.sources);
     for (const Behaviour& behaviour : model_.behaviours) {
       auto& expanded = conditions_.emplace_back();
       std::size_t& terms = condition_terms_.emplace_back();

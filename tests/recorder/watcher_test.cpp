@@ -72,12 +72,12 @@ TEST(Record, SaysOnceThatItMayNotObserveAnyMore) {
   Recording recording(daemon);
   files.write("policy", kNotObserve);
   daemon.hang_up();
-  const std::string lost = "this user may not observe any more; it is tried again: user ";
+  const std::string lost = "the daemon refuses to tell; it is tried again: user ";
   recording.see(lost);
   await([&] { return count_of("may not observe", daemon.log()) >= 2; });  // it is
   files.write("policy", kAll);
   daemon.hang_up();
-  recording.see("this user may observe again");
+  recording.see("the daemon tells again");
   Node node("test");
   auto come = node.output_port<int>("/come");
   while (recording.records<Arrival>().empty()) come.publish(1);
