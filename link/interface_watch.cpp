@@ -110,8 +110,8 @@ std::string InterfaceWatch::change() {
   for (const auto& [name, place] : *now) {
     const Place& before = places_[name];
     // One that goes down and comes up is joined all the while, unless it was down at the beginning.
-    const bool is_new = place.is_usable() && !before.is_usable();
-    if (place == before && !is_new) continue;
+    const bool was_out = !before.is_usable();
+    if (was_out ? !place.is_usable() : place == before) continue;
     if (place.index == 0) return "the network interface " + name + " has gone";
     if (place.address == 0) return "the network interface " + name + " has no address any more";
     const bool is_other = before.address != 0 && place.index != before.index;

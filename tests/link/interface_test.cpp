@@ -105,6 +105,26 @@ TEST_F(Cable, OneOfTwoInterfacesMayGoAndComeBack) {
   body.drive(planner);
 }
 
+// Its address stays where it is.
+TEST_F(Cable, OneOfTwoInterfacesMayBeDown) {
+  CabledRobot robot;
+  robot.head_network.ip("link add eth1 type veth peer name other1");
+  robot.head_network.ip("addr add 10.78.0.1/24 dev eth1");
+  robot.head_network.ip("link set other1 up");
+  const std::vector<std::string> both{"--interface", "eth0", "--interface", "eth1"};
+  Host head("head", robot.runtime, source_model("300ms"), both, robot.head_network.enter());
+  Host base = robot.base(motor_model("300ms"));
+  head.see(
+      "host head, on eth0 alone: of eth0, eth1 (--interface), the rest is not there now, is "
+      "down");
+  Planner planner(head);
+  Body body(base);
+  body.drive(planner);
+  robot.head_network.ip("link set eth1 up");
+  head.see("host head, on eth0, eth1\n");
+  body.drive(planner);
+}
+
 // Who switches all hosts is told of one that is gone, whatever this link has been through since.
 TEST_F(Cable, ALinkThatJoinsAgainRemembersWhoIsGone) {
   CabledRobot robot;
