@@ -84,7 +84,7 @@ TEST(Control, ReloadTellsOfThePolicyIfItsRulesHaveChanged) {
   files.write("policy", "deny everyone stop\nallow everyone all\n");
   EXPECT_THAT(arbiter({"reload", "--dry-run"}).out,
               HasSubstr("the policy " + policy +
-                        " differs from the one in force: it has 2 rules\nnothing has changed"));
+                        " differs from the one in force: it has 2 rules\nthis was a dry run"));
   const auto report = nlohmann::json::parse(arbiter({"reload", "--dry-run", "--json"}).out);
   EXPECT_EQ(report["policy"], (nlohmann::json{{"file", policy}, {"rules", 2}, {"differs", true}}));
   EXPECT_EQ(arbiter({"reload"}).out,
