@@ -81,8 +81,8 @@ TEST(ReplayThatIsInterrupted, SaysThatItWasStopped) {
     Node node("test");
     auto low = node.output_port<int>("/low");
     Recording recording(daemon, {"--payloads", "all"});
-    low.publish(1);
-    ::poll(nullptr, 0, 200);  // of which the replay makes ten seconds
+    const Time before = std::chrono::steady_clock::now() - std::chrono::milliseconds(200);
+    low.publish_at(before, 1);  // of what lies between, the replay makes ten seconds
     low.publish(2);
     EXPECT_EQ(recording.end(), 0);
     file = recording.file();
