@@ -20,15 +20,13 @@ int level_of(int node) { return node < 2 ? kConstantLevel : bdd_var2level(bdd_va
 }  // namespace
 
 std::size_t NodePairs::place_of(std::uint64_t pair) const {
-  const std::size_t mask = entries_.size() - 1;
-  std::size_t place = (pair * 0x9E3779B97F4A7C15u) >> 40 & mask;
-  while (entries_[place].pair != kFree && entries_[place].pair != pair) place = (place + 1) & mask;
-  return place;
+  return place_of_pair(pair, entries_.size(),
+                       [this](std::size_t place) { return entries_[place].pair; });
 }
 
 const int* NodePairs::find(int left, int right) const {
   const Entry& entry = entries_[place_of(pair_of(left, right))];
-  return entry.pair == kFree ? nullptr : &entry.result;
+  return entry.pair == kNoPair ? nullptr : &entry.result;
 }
 
 void NodePairs::insert(int left, int right, int result) {

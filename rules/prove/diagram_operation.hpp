@@ -12,6 +12,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "rules/prove/pair_table.hpp"
+
 namespace arbiter::rules {
 
 // What is known of pairs of nodes, and of the steps that were taken to know it. The results are
@@ -30,10 +32,9 @@ class NodePairs {
 
  private:
   struct Entry {
-    std::uint64_t pair = kFree;
+    std::uint64_t pair = kNoPair;
     int result = 0;
   };
-  static constexpr std::uint64_t kFree = ~std::uint64_t{0};
   static constexpr std::size_t kFirstEntries = 1024;  // a power of two
   static constexpr std::size_t kKeptEntries = 65536;  // after a large operation
 

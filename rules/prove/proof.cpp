@@ -33,25 +33,22 @@ std::vector<Literals> implied_by_each(const DiagramNodes& function) {
 }  // namespace
 
 void NodePairSet::clear() {
-  slots_.assign(kFirstSlots, kFree);
+  slots_.assign(kFirstSlots, kNoPair);
   used_ = 0;
 }
 
 std::size_t NodePairSet::place_of(std::uint64_t pair) const {
-  const std::size_t mask = slots_.size() - 1;
-  std::size_t place = (pair * 0x9E3779B97F4A7C15u) >> 32 & mask;
-  while (slots_[place] != kFree && slots_[place] != pair) place = (place + 1) & mask;
-  return place;
+  return place_of_pair(pair, slots_.size(), [this](std::size_t place) { return slots_[place]; });
 }
 
 void NodePairSet::insert(std::uint64_t pair) {
   if (used_ >= slots_.size() / 4 * 3) {
     std::vector<std::uint64_t> before;
     if (slots_.size() < max_slots_) before.swap(slots_);
-    slots_.assign(std::max(2 * before.size(), slots_.size()), kFree);
+    slots_.assign(std::max(2 * before.size(), slots_.size()), kNoPair);
     used_ = 0;
     for (const std::uint64_t each : before) {
-      if (each != kFree) insert(each);
+      if (each != kNoPair) insert(each);
     }
   }
   slots_[place_of(pair)] = pair;

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "rules/prove/diagram.hpp"
+#include "rules/prove/pair_table.hpp"
 
 namespace arbiter::rules {
 
@@ -64,7 +65,6 @@ class NodePairSet {
   void insert(std::uint64_t pair);
 
  private:
-  static constexpr std::uint64_t kFree = ~std::uint64_t{0};
   static constexpr std::size_t kFirstSlots = 256;  // a power of two, as the most are
 
   // Of the pair, or of the free slot for it.
