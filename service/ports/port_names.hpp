@@ -144,6 +144,7 @@ class PortNames {
   [[nodiscard]] const std::map<std::uint64_t, News>& news() const { return news_; }
   [[nodiscard]] std::uint64_t last_news() const { return last_news_; }
   [[nodiscard]] const shm::ActivityPages& pages() const { return *pages_; }
+  // Pages of names that are forgotten, and ports that had names.
   [[nodiscard]] ClosedPorts& closed() { return closed_; }
   [[nodiscard]] const ClosedPorts& closed() const { return closed_; }
 
