@@ -191,9 +191,9 @@ TEST_F(ChangingModels, ADryRunShowsWhatAReloadWouldDo) {
   write_other(only("b") + " ");
   auto result = arbiter({"reload", "--dry-run"});
   EXPECT_EQ(result.exit_code, 0) << result.err;
-  EXPECT_THAT(result.out, AllOf(HasSubstr("default: no difference: 1 port decides alike"),
-                                HasSubstr("other (in force): no difference"),
-                                HasSubstr("this was a dry run")));
+  EXPECT_THAT(result.out,
+              AllOf(HasSubstr("default: no difference: 1 port decides alike"),
+                    HasSubstr("other (in force): no difference"), HasSubstr("this was a dry run")));
   write_other(only("d"));
   result = arbiter({"reload", "--dry-run"});
   EXPECT_EQ(result.exit_code, 0) << result.err;
