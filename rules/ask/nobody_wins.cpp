@@ -286,23 +286,25 @@ class PortFindings {
     return way;
   }
 
-  // x is silenced by y, which is silenced by z: all three are active, nobody wins, x would win if
-  // y alone were inactive, and y would win if z alone were. Those that share y and z make one
-  // finding.
+  // x is silenced by y, which z keeps from winning: x and y are active, nobody wins, x would win if
+  // y alone were inactive, and y would win if z alone were inactive, where z is active and silences
+  // it, or active, where its condition lacks z. Those that share y and z make one finding.
   void note_chains() {
     std::size_t chains = 0;
-    for (std::size_t y = 0; y < candidates_.size(); ++y) {
-      const auto& reads = candidates_[y].rule->reads;
-      std::optional<Diagram> with_y;
-      for (const auto& z : reads) {
-        if (chains == kMaxChains) return;
-        const Candidates silenced = may_be_silenced(y, z);
-        if (silenced.none()) continue;
-        if (!with_y) {
-          const auto& source = candidates_[y].rule->source;
-          with_y = winners_->combine(Connective::kAnd, nobody_, winners_->active(source));
+    for (const bool lacks_z : {false, true}) {
+      for (std::size_t y = 0; y < candidates_.size(); ++y) {
+        const auto& reads = candidates_[y].rule->reads;
+        std::optional<Diagram> with_y;
+        for (const auto& z : reads) {
+          if (chains == kMaxChains) return;
+          const Candidates silenced = may_be_silenced(y, z, lacks_z);
+          if (silenced.none()) continue;
+          if (!with_y) {
+            const auto& source = candidates_[y].rule->source;
+            with_y = winners_->combine(Connective::kAnd, nobody_, winners_->active(source));
+          }
+          chains += note_chain(candidates_[y], z, lacks_z, *with_y, silenced) ? 1 : 0;
         }
-        chains += note_chain(candidates_[y], z, *with_y, silenced) ? 1 : 0;
       }
     }
   }
@@ -326,9 +328,10 @@ class PortFindings {
   // The x of chains x, y, z as far as single literals tell: x reads y, and neither do x or y
   // exclude each other's neighbour in the chain. Where all inhibit all, there would be cubes of
   // chains to look at, and none passes this.
-  Candidates may_be_silenced(std::size_t y, const std::string& z) {
+  Candidates may_be_silenced(std::size_t y, const std::string& z, bool lacks_z) {
     const std::string& by = candidates_[y].rule->source;
-    Candidates result = readers_of_[by] & ~inhibited_by_[z] & ~place_of_[z];
+    Candidates result = readers_of_[by] & ~place_of_[z];
+    if (!lacks_z) result &= ~inhibited_by_[z];
     result.reset(y);
     if (result.none()) return result;
     for (std::size_t x = 0; x < candidates_.size(); ++x) {
@@ -337,11 +340,12 @@ class PortFindings {
     return result;
   }
 
-  bool note_chain(const Candidate& y, const std::string& z, const Diagram& with_y,
+  bool note_chain(const Candidate& y, const std::string& z, bool lacks_z, const Diagram& with_y,
                   const Candidates& silenced) {
     const std::string& by = y.rule->source;
-    Diagram blocked = winners_->combine(Connective::kAnd, with_y, winners_->active(z));
-    blocked = winners_->combine(Connective::kAnd, blocked, winners_->given(y.wins, z, false));
+    Diagram blocked = winners_->combine(lacks_z ? Connective::kAndNot : Connective::kAnd, with_y,
+                                        winners_->active(z));
+    blocked = winners_->combine(Connective::kAnd, blocked, winners_->given(y.wins, z, lacks_z));
     std::vector<std::string> names;
     std::optional<Witness> shortest;
     bool is_known = true;  // to be a shortest of all
@@ -361,11 +365,11 @@ class PortFindings {
     shortest->is_shortest = is_known;
     const std::string others = enumerate(names);
     diagnostics_.note("starved", where_of(by),
-                      "at " + port_.port + ", " + by + " silences " + others + " even while " + z +
-                          " silences " + by + ": with " + in_words(*shortest) +
-                          ", nobody wins; if " + names.front() +
+                      "at " + port_.port + ", " + by + " silences " + others + " even while " +
+                          (lacks_z ? by + " cannot win for want of " + z : z + " silences " + by) +
+                          ": with " + in_words(*shortest) + ", nobody wins; if " + names.front() +
                           " should win then, let no inhibition but its condition \"not " + by +
-                          " or " + z + "\" keep it out",
+                          (lacks_z ? " or not " : " or ") + z + "\" keep it out",
                       {.ports = {port_.port}, .source = by}, *shortest);
     return true;
   }

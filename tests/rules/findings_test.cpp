@@ -76,6 +76,18 @@ TEST(Findings, NameAShortestStateWithoutAWinnerAndItsPlace) {
   EXPECT_EQ(found.items[1].where.line, 3u);
 }
 
+// What first models get wrong: the inhibitor is active, but its own condition is not fulfilled.
+TEST(Findings, NameWhoSilencesOthersWhileItsConditionFails) {
+  const auto found = found_in(
+      RulesByHand().port("/p", {{"/low", inactive("/high")}, {"/high", active("/enable")}}));
+  ASSERT_THAT(found.codes(), ElementsAre("nobody-wins", "starved"));
+  EXPECT_EQ(found.items[1].message,
+            "at /p, /high silences /low even while /high cannot win for want of /enable: with "
+            "/high and /low active and /enable inactive, nobody wins; if /low should win then, let "
+            "no inhibition but its condition \"not /high or not /enable\" keep it out");
+  EXPECT_EQ(found.items[1].where.line, 3u);
+}
+
 TEST(Findings, SourcesThatKeepEachOtherOutAreACircle) {
   const auto found = found_in(RulesByHand().port(
       "/p", {{"/a", inactive("/b")}, {"/b", inactive("/c")}, {"/c", inactive("/a")}}));
@@ -100,7 +112,7 @@ TEST(Findings, EachCauseOfNobodyIsToldWhereverItLies) {
       found_in(RulesByHand().port("/p", {{"/low", all_of({inactive("/mid"), inactive("/top")})},
                                          {"/mid", all_of({active("/enable"), inactive("/top")})},
                                          {"/top", inactive("/fault")}}));
-  ASSERT_THAT(found.codes(), ElementsAre("nobody-wins", "starved"));
+  ASSERT_THAT(found.codes(), ElementsAre("nobody-wins", "starved", "starved"));
   EXPECT_THAT(found.items[0].message, HasSubstr("with /fault and /top active"));
   ASSERT_EQ(found.items[0].more_witnesses.size(), 1u);
   EXPECT_THAT(found.items[0].more_witnesses[0].active, ElementsAre("/mid"));

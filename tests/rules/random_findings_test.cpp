@@ -62,23 +62,25 @@ class ExhaustiveFindings {
     return winners_.at(port)[state] == kNone && (state & candidates(port)) != 0;
   }
 
-  // "port y z": some x is silenced by y, which is silenced by z.
-  std::set<std::string> chains(const std::string& port) const {
+  // "port y  z": some x is silenced by y, which is silenced by z; or "port y cannot win z".
+  std::set<std::string> chains(const std::string& port, bool lacks_z) const {
     std::set<std::string> result;
     const auto& winners = winners_.at(port);
     const auto count = static_cast<int>(words_.sources.size());
     for (std::size_t state = 0; state < states_.size(); ++state) {
       if (!is_of_nobody(port, state)) continue;
-      const auto would_win = [&](int source, int without) {
-        return source != without && winners[state & ~bit(without)] == source;
+      const auto would_win = [&](int source, int other, bool with_other) {
+        const auto then = with_other ? state | bit(other) : state & ~bit(other);
+        return source != other && winners[then] == source;
       };
       for (int y = 0; y < count; ++y) {
         if ((state & candidates(port) & bit(y)) == 0) continue;
         for (int z = 0; z < count; ++z) {
-          if ((state & bit(z)) == 0 || !would_win(y, z)) continue;
+          if (((state & bit(z)) == 0) != lacks_z || !would_win(y, z, lacks_z)) continue;
           for (int x = 0; x < count; ++x) {
-            if (x == z || (state & bit(x)) == 0 || !would_win(x, y)) continue;
-            result.insert(port + " " + words_.sources[static_cast<std::size_t>(y)] + " " +
+            if (x == z || (state & bit(x)) == 0 || !would_win(x, y, false)) continue;
+            result.insert(port + " " + words_.sources[static_cast<std::size_t>(y)] +
+                          (lacks_z ? " cannot win " : "  ") +
                           words_.sources[static_cast<std::size_t>(z)]);
           }
         }
@@ -148,7 +150,8 @@ std::set<std::string> first_matches(const std::vector<Diagnostic>& items, const 
 }
 
 struct Seen {
-  int compared = 0, never_runs = 0, unreachable = 0, never_wins = 0, nobody = 0, chains = 0;
+  int compared = 0, never_runs = 0, unreachable = 0, never_wins = 0, nobody = 0, chains = 0,
+      lacking = 0;
 };
 
 void compare(const RandomModel& random, const Vocabulary& words,
@@ -218,17 +221,23 @@ void compare(const RandomModel& random, const Vocabulary& words,
     }
   }
 
-  const auto found =
-      first_matches(items, "starved", "at (\\S+), (\\S+) silences .* even while (\\S+) silences ");
+  const auto found = first_matches(items, "starved",
+                                   "at (\\S+), (\\S+) silences .* even while "
+                                   "(?:\\S+ (cannot win) for want of )?(\\S+)(?: silences|:)");
   for (const auto& port : words.ports) {
-    const auto all = expected.chains(port);
-    std::set<std::string> here;
-    for (const auto& chain : found) {
-      if (chain.starts_with(port + " ")) here.insert(chain);
+    std::size_t left = 4;
+    for (const bool lacks_z : {false, true}) {
+      const auto all = expected.chains(port, lacks_z);
+      std::set<std::string> here;
+      for (const auto& chain : found) {
+        const bool is_of_these = (chain.find("cannot win") != std::string::npos) == lacks_z;
+        if (is_of_these && chain.starts_with(port + " ")) here.insert(chain);
+      }
+      EXPECT_TRUE(std::includes(all.begin(), all.end(), here.begin(), here.end()));
+      EXPECT_EQ(here.size(), std::min(all.size(), left));
+      left -= here.size();
+      (lacks_z ? seen.lacking : seen.chains) += static_cast<int>(here.size());
     }
-    EXPECT_TRUE(std::includes(all.begin(), all.end(), here.begin(), here.end()));
-    EXPECT_EQ(here.size(), std::min<std::size_t>(all.size(), 4));
-    seen.chains += static_cast<int>(here.size());
   }
 }
 
@@ -250,6 +259,7 @@ TEST(RandomFindings, AreThoseOfAllStates) {
   EXPECT_GT(seen.never_wins, rounds(5));
   EXPECT_GT(seen.nobody, rounds(300));
   EXPECT_GT(seen.chains, rounds(50));
+  EXPECT_GT(seen.lacking, rounds(50));
 }
 
 TEST(RandomFindings, AreThoseOfAllStatesOfTenSources) {
