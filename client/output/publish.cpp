@@ -387,7 +387,8 @@ void OutputCore::deactivate(shm::Nanoseconds now) noexcept {
   if (handover_.has_offer()) accept_view();
   if (!rules_are_bound()) bind_rules();
   const bool ends = shm::is_active(own_word_, now);
-  stamp(shm::deactivation(now), false);
+  // Once more changes nothing: since when it is so stays known.
+  if (!shm::is_deactivation(own_word_)) stamp(shm::deactivation(now), false);
   last_ = now;
   if (teller_.is_on()) tell_deactivation();
   if (ends) ring_where_selection_changed();

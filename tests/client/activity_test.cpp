@@ -6,6 +6,7 @@
 #include "tests/client/component.hpp"
 #include "tests/client/models.hpp"
 #include "tests/client/samples.hpp"
+#include "tests/client/tapping.hpp"
 #include "tests/support/daemon.hpp"
 
 namespace arbiter::test {
@@ -91,6 +92,26 @@ TEST(Activity, DeactivatingEndsItAtOnce) {
   EXPECT_FALSE(is_active(daemon, "/high"));
   EXPECT_EQ(low.publish(Number{2}).delivered, 1u);
   EXPECT_EQ(take_from(in), 2);
+}
+
+// Who is asked since when a robot stands still must not be told when the stop was last repeated.
+TEST(Activity, DeactivatingOnceMoreKeepsTheTimeOfTheFirst) {
+  Daemon daemon(override_model());
+  Node node("test");
+  auto high = node.output_port<Number>("/high");
+  Node other("watcher");
+  auto tap = other.tap("/high");
+  wait_until_watched(high, tap);
+  high.signal();
+  high.deactivate();
+  high.deactivate();
+  EXPECT_EQ(next_of(tap)->kind(), TapEventKind::signal);
+  const auto first = next_of(tap);
+  const auto again = next_of(tap);
+  EXPECT_EQ(again->kind(), TapEventKind::deactivation);
+  EXPECT_LT(first->time(), again->time());
+  EXPECT_EQ(first->stands_since(), first->time());
+  EXPECT_EQ(again->stands_since(), first->time());
 }
 
 TEST(Activity, EndsByItselfAfterItsTime) {
