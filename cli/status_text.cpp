@@ -39,7 +39,8 @@ std::string holder(StatusPlace place, const auto& port) {
 // What its component says of it.
 void print_outside(std::ostream& out, const auto& port, const char* how) {
   if (!port.open || !port.open->described) return;
-  out << "           " << how << shm::printable(*port.open->described) << '\n';
+  out << (port.open->trouble.value_or(false) ? "         ! " : "           ") << how
+      << shm::printable(*port.open->described) << '\n';
 }
 
 std::string type_of(const auto& port) {

@@ -117,7 +117,8 @@ void Daemon::handle(Client& client, wire::Received& received) {
       break;
     case wire::MessageKind::kDescribe:
       if (client.ports.count(message.port) != 0) {
-        switchboard_.describe(message.port, shm::printable(message.text_view()));
+        switchboard_.describe(message.port,
+                              {shm::printable(message.text_view()), message.value == 1});
       }
       break;
     case wire::MessageKind::kConnect:

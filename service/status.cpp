@@ -33,6 +33,10 @@ std::optional<std::string> text_of(const std::string& text) {
   return text.empty() ? std::nullopt : std::optional(text);
 }
 
+std::optional<bool> trouble_of(const Description& described) {
+  return described.is_trouble ? std::optional(true) : std::nullopt;
+}
+
 wire::Component component_of(const Client& client) {
   return {client.name, client.pid(), client.user()};
 }
@@ -180,7 +184,8 @@ class Document {
             read(counters.delivered),     read(counters.discarded),
             read(counters.refused),       read(counters.blind),
             read(counters.unsettled),     read(counters.no_slot),
-            read(counters.late),          text_of(output.described)};
+            read(counters.late),          text_of(output.described.text),
+            trouble_of(output.described)};
   }
 
   wire::InputStatus input(const InputName& name) {
@@ -219,7 +224,8 @@ class Document {
             read(header.counters.unsettled),
             read(header.counters.misbehaved),
             read(header.counters.idles),
-            text_of(input.described)};
+            text_of(input.described.text),
+            trouble_of(input.described)};
   }
 
   void add_connections(const InputName& name, const InputPort* input, wire::InputStatus& result) {

@@ -360,6 +360,7 @@ const std::vector<std::string>& finding_codes() {
                                               "type-mismatch",
                                               "cannot-deliver",
                                               "opening-refused",
+                                              "port-trouble",
                                               "near-name",
                                               "slow-publisher",
                                               "silent-link",

@@ -10,6 +10,7 @@
 
 #include "rules/text/names.hpp"
 #include "shm/clock.hpp"
+#include "shm/utf8.hpp"
 #include "watch/doctor.hpp"
 #include "watch/past.hpp"
 #include "watch/process.hpp"
@@ -108,6 +109,22 @@ void add_refused(const wire::Status& status, Findings& found) {
   }
 }
 
+void add_troubles(const auto& ports, const char* how, FewFindings& few) {
+  for (const auto& port : ports) {
+    if (!port.open || !port.open->described || !port.open->trouble.value_or(false)) continue;
+    few.add(port.name + how + shm::printable(*port.open->described),
+            process_text(port.open->component) + ", which has the port open, says so",
+            "its words say what is wrong; its page and its log say more");
+  }
+}
+
+// What components call wrong with what stands behind their ports.
+void add_troubles(const wire::Status& status, Findings& found) {
+  FewFindings few(found, "port-trouble", "ports have trouble behind them");
+  add_troubles(status.sources, " comes from ", few);
+  add_troubles(status.inputs, " goes to ", few);
+}
+
 // Ports that the model does not mention, while nobody has one open that is nearly called so.
 void add_near_names(const auto& ports, FewFindings& few) {
   std::vector<std::string_view> wanted;
@@ -142,6 +159,7 @@ Findings examine_ports(const wire::Status& status) {
   add_mismatches(status, found);
   add_useless_winners(status, found);
   add_refused(status, found);
+  add_troubles(status, found);
   add_near_names(status, found);
   return found;
 }

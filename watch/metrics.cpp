@@ -150,6 +150,8 @@ constexpr std::array kInputNumbers{
                       "Size of a sample by the type that the port takes; 0 for an untyped port.",
                       [](const OpenInput& i) { return i.type ? i.type->size : 0; }}};
 
+std::uint64_t has_trouble(const auto& open) { return open && open->trouble.value_or(false); }
+
 constexpr std::array kSourceNumbers{
     Number<SourceStatus>{"source_active", Kind::kGauge, "Whether the source is active now.",
                          [](const SourceStatus& s) { return std::uint64_t{s.active}; }},
@@ -162,7 +164,10 @@ constexpr std::array kSourceNumbers{
     Number<SourceStatus>{
         "source_away", Kind::kGauge,
         "Whether its component lives, and has not come back to this daemon yet.",
-        [](const SourceStatus& s) { return std::uint64_t{s.away_pid.has_value()}; }}};
+        [](const SourceStatus& s) { return std::uint64_t{s.away_pid.has_value()}; }},
+    Number<SourceStatus>{"source_trouble", Kind::kGauge,
+                         "Whether its component says that something is wrong behind the port.",
+                         [](const SourceStatus& s) { return has_trouble(s.open); }}};
 
 constexpr std::array kPortNumbers{
     Number<InputStatus>{"port_idle", Kind::kGauge, "Whether nobody commands the input port.",
@@ -182,10 +187,12 @@ constexpr std::array kPortNumbers{
                         [](const InputStatus& p) { return std::uint64_t{p.in_order}; }},
     Number<InputStatus>{"port_open", Kind::kGauge, "Whether a component has the input port open.",
                         [](const InputStatus& p) { return std::uint64_t{p.open.has_value()}; }},
-    Number<InputStatus>{
-        "port_away", Kind::kGauge,
-        "Whether its component lives, and has not come back to this daemon yet.",
-        [](const InputStatus& p) { return std::uint64_t{p.away_pid.has_value()}; }}};
+    Number<InputStatus>{"port_away", Kind::kGauge,
+                        "Whether its component lives, and has not come back to this daemon yet.",
+                        [](const InputStatus& p) { return std::uint64_t{p.away_pid.has_value()}; }},
+    Number<InputStatus>{"port_trouble", Kind::kGauge,
+                        "Whether its component says that something is wrong behind the port.",
+                        [](const InputStatus& p) { return has_trouble(p.open); }}};
 
 constexpr std::array kConnectionNumbers{
     Number<ConnectionStatus>{"connection_winner", Kind::kGauge,

@@ -48,7 +48,8 @@ void add_unknown(const StrangerStatus& stranger, std::vector<Obstacle>& result) 
 void add_outside(const std::string& name, const char* how, const auto& open,
                  std::vector<Obstacle>& result) {
   if (open.described) {
-    result.push_back({"outside", name + how + shm::printable(*open.described), false});
+    result.push_back(
+        {"outside", name + how + shm::printable(*open.described), open.trouble.value_or(false)});
   }
 }
 

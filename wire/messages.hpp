@@ -70,7 +70,8 @@ enum class MessageKind : std::uint32_t {
   // kConnected as for a port; it is closed as one. One that another daemon has opened asks
   // again
   kTapped,     // answers kTap. port, peer; link, value: where the tap reads; descriptor: the events
-  kDescribe,   // port, text: what stands behind it, for the status; empty: nothing
+  kDescribe,   // port, text: what stands behind it, for the status; empty: nothing. value: 1 where
+               // something is wrong with it
   kMay = 60,   // value: a user; text: its groups, numbers between blanks; name: an action that is
                // about no port. kDone: the policy allows it; kRefused, text: why not
   kNodeEnded,  // link: the node itself, or one of its process that may have ended unheard

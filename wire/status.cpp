@@ -140,6 +140,7 @@ void describe(auto& field, Is<OpenOutput> auto& of) {
   field.counter("no_slot", of.no_slot);
   field.counter("late", of.late);
   field.maybe("described", of.described);
+  field.maybe("trouble", of.trouble);
 }
 
 void describe(auto& field, Is<SourceStatus> auto& of) {
@@ -187,6 +188,7 @@ void describe(auto& field, Is<OpenInput> auto& of) {
   field.counter("misbehaved", of.misbehaved);
   field.counter("idles", of.idles);
   field.maybe("described", of.described);
+  field.maybe("trouble", of.trouble);
 }
 
 void describe(auto& field, Is<UselessWinner> auto& of) {

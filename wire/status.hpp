@@ -118,6 +118,7 @@ struct OpenOutput {
   std::uint64_t no_slot = 0;
   std::uint64_t late = 0;
   std::optional<std::string> described;  // by its component: what stands behind it
+  std::optional<bool> trouble;           // it is something that is wrong
 };
 
 struct SourceStatus {
@@ -177,6 +178,7 @@ struct OpenInput {
   std::uint64_t misbehaved = 0;  // entries of queues
   std::uint64_t idles = 0;       // times that the component was told
   std::optional<std::string> described;
+  std::optional<bool> trouble;
 };
 
 // A connection that is selected, and cannot deliver.

@@ -131,8 +131,8 @@ void deactivate_at(OutputCore& core, Time at) {
   begin_replay(core, at);
   core.deactivate(nanoseconds(at));
 }
-void describe(OutputCore& core, std::string_view text) noexcept {
-  if (is_own(core)) core.node->describe(core.instance(), text);
+void describe(OutputCore& core, std::string_view text, bool is_trouble) noexcept {
+  if (is_own(core)) core.node->describe(core.instance(), text, is_trouble);
 }
 bool asked_to_yield(const OutputCore& core) noexcept { return core.asked_to_yield(); }
 std::size_t max_size(const OutputCore& core) noexcept { return core.type().size; }
@@ -176,8 +176,8 @@ int wait_descriptor(InputCore& core) {
   require_own(core);
   return core.wait_descriptor();
 }
-void describe(InputCore& core, std::string_view text) noexcept {
-  if (is_own(core)) core.node->describe(core.instance(), text);
+void describe(InputCore& core, std::string_view text, bool is_trouble) noexcept {
+  if (is_own(core)) core.node->describe(core.instance(), text, is_trouble);
 }
 std::optional<std::string_view> winner(InputCore& core) noexcept {
   if (!is_own(core)) return {};

@@ -16,7 +16,8 @@ constexpr std::size_t kMaxDescription = 511;
 
 // The service thread tells it, or service(): a component that describes its port a thousand times a
 // second sends no more than one that does so now and then.
-void NodeCore::describe(shm::PortInstance port, std::string_view text) noexcept try {
+void NodeCore::describe(shm::PortInstance port, std::string_view text, bool is_trouble) noexcept
+    try {
   std::size_t length = std::min(text.size(), kMaxDescription);
   while (length != 0 && length < text.size() &&
          (static_cast<unsigned char>(text[length]) & 0xc0) == 0x80) {
@@ -26,8 +27,9 @@ void NodeCore::describe(shm::PortInstance port, std::string_view text) noexcept 
     const std::lock_guard lock(mutex_);
     if (outputs_.count(port) + inputs_.count(port) == 0) return;
     Description& description = descriptions_[port];
-    if (description.text == text.substr(0, length)) return;
+    if (description.text == text.substr(0, length) && description.is_trouble == is_trouble) return;
     description.text = text.substr(0, length);
+    description.is_trouble = is_trouble;
     description.is_said = false;
   }
   service_bell_->ring();
@@ -42,6 +44,7 @@ void NodeCore::say_descriptions() noexcept {
     wire::Message message;
     message.kind = wire::MessageKind::kDescribe;
     message.port = port;
+    message.value = description.is_trouble ? 1 : 0;
     message.set_text(description.text);
     description.said_at = now;
     // What follows may say something else: it does not wait in the outbox.

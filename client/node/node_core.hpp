@@ -64,7 +64,7 @@ class NodeCore : public std::enable_shared_from_this<NodeCore> {
   template <class Core>
   void close(const Core& core) noexcept;
   // What stands behind a port, for the status.
-  void describe(shm::PortInstance port, std::string_view text) noexcept;
+  void describe(shm::PortInstance port, std::string_view text, bool is_trouble) noexcept;
 
   // Without a service thread: takes up what the daemon has said so far, without blocking.
   void service();
@@ -259,6 +259,7 @@ class NodeCore : public std::enable_shared_from_this<NodeCore> {
   bool is_giving_ = false;
   struct Description {
     std::string text;
+    bool is_trouble = false;
     bool is_said = true;
     shm::Nanoseconds said_at = 0;
   };

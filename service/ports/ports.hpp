@@ -50,6 +50,12 @@ class PortBell : public std::enable_shared_from_this<PortBell> {
 inline constexpr std::uint64_t kDescriptorsOfOutput = 1;
 inline constexpr std::uint64_t kDescriptorsOfInput = 2;
 
+// Of a port, by its component.
+struct Description {
+  std::string text;  // printable
+  bool is_trouble = false;
+};
+
 struct OutputPort {
   shm::PortInstance instance = 0;
   Client* client = nullptr;
@@ -62,7 +68,7 @@ struct OutputPort {
   Claims claims;
   bool is_told_unmentioned = false;  // that the model in force does not mention it
   bool is_known_blind = false;       // the log has it
-  std::string described;             // by its component; printable
+  Description described;             // by its component
   bool yields = false;               // to another component that asks for its name
   bool is_asked_to_yield = false;    // one has asked
   Charge charge;
@@ -85,7 +91,7 @@ struct InputPort {
   Claims claims;
   bool is_told_unmentioned = false;
   bool is_known_blind = false;
-  std::string described;
+  Description described;
   Charge charge;
 
   ~InputPort();

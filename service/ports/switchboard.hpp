@@ -96,7 +96,7 @@ class Switchboard {
   // A component says that its port cannot see all that its rules read: for the log, once.
   void note_blind(shm::PortInstance port, const std::string& text);
   // What its component says of it.
-  void describe(shm::PortInstance port, std::string text);
+  void describe(shm::PortInstance port, Description description);
   // Asks an output port that yields to go: `who` wants its name. Once for each port.
   void ask_to_yield(shm::PortInstance port, const std::string& who);
   // Wakes every component that waits, to look anew.

@@ -165,11 +165,11 @@ void Switchboard::note_blind(shm::PortInstance port, const std::string& text) {
             log::level::warn, "{}: {}", client_of(port).description(), text);
 }
 
-void Switchboard::describe(shm::PortInstance port, std::string text) {
+void Switchboard::describe(shm::PortInstance port, Description description) {
   if (const auto output = outputs_.find(port); output != outputs_.end()) {
-    output->second->described = std::move(text);
+    output->second->described = std::move(description);
   } else if (const auto input = inputs_.find(port); input != inputs_.end()) {
-    input->second->described = std::move(text);
+    input->second->described = std::move(description);
   }
 }
 

@@ -84,7 +84,7 @@ TEST(WhyDaemon, SaysWhatComponentsSayOfTheirPorts) {
   auto track = node.output_port<int>("/track");
   auto arm = node.input_port<int>("/arm");
   rest.describe("DDS topic rt/rest, no publisher matched");
-  track.describe("iceoryx a/b/c, RouDi does not run\x1b[2J");
+  track.describe_trouble("iceoryx a/b/c, RouDi does not run\x1b[2J");
   arm.describe("DDS topic rt/arm, 1 subscriber matched");
   while (!daemon.source("/rest").contains("described") ||
          !daemon.source("/track").contains("described") ||
@@ -94,7 +94,7 @@ TEST(WhyDaemon, SaysWhatComponentsSayOfTheirPorts) {
       why({"/arm"}),
       AllOf(HasSubstr("\n  /arm goes to DDS topic rt/arm, 1 subscriber matched\n"),
             HasSubstr("\n  /rest comes from DDS topic rt/rest, no publisher matched\n"),
-            HasSubstr("\n  /track comes from iceoryx a/b/c, RouDi does not run\\x1b[2J\n")));
+            HasSubstr("\n  ! /track comes from iceoryx a/b/c, RouDi does not run\\x1b[2J\n")));
   EXPECT_THAT(codes(why_json({"/arm"})["obstacles"]), ElementsAre("outside"));
   EXPECT_THAT(status_text(),
               AllOf(HasSubstr("  comes from DDS topic rt/rest, no publisher matched\n"),

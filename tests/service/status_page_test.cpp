@@ -79,8 +79,8 @@ void see_ports(ObservedFields& observed) {
   auto in_here = node.input_port("/in-here", {.when_full = refuse_new});
   auto in_typed = node.input_port<int>("/in-typed");
   auto tap = node.tap("/here");
-  here.describe("a topic");
-  in_here.describe("a topic");
+  here.describe_trouble("a topic");
+  in_here.describe_trouble("a topic");
   daemon.kill();
   stopped.process().stop();
   daemon.restart();

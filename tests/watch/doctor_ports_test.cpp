@@ -110,6 +110,19 @@ TEST(DoctorPorts, FindsNamesThatAreNearlyThoseOfTheModel) {
   EXPECT_THAT(watch::examine_ports(status), IsEmpty()) << "nobody is missing";
 }
 
+TEST(DoctorPorts, FindsWhatComponentsCallWrong) {
+  wire::Status status;
+  status.sources = {open_source("/nav/cmd:o", true), open_source("/joy/cmd:o", true)};
+  status.sources[0].open->described = "DDS topic rt/nav, no publisher matched";
+  status.sources[1].open->described = "DDS topic rt/joy, QoS does not match\x1b[2J";
+  EXPECT_THAT(watch::examine_ports(status), IsEmpty());
+  status.sources[1].open->trouble = true;
+  const Findings found = watch::examine_ports(status);
+  ASSERT_THAT(codes_of(found), ElementsAre("port-trouble"));
+  EXPECT_EQ(found[0].what, "/joy/cmd:o comes from DDS topic rt/joy, QoS does not match\\x1b[2J");
+  EXPECT_EQ(found[0].why, "nav (pid 12), which has the port open, says so");
+}
+
 TEST(DoctorPorts, ListsAFewOfEachKind) {
   wire::Status status;
   status.inputs = {wanted_input("/base:i")};

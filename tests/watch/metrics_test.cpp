@@ -52,6 +52,9 @@ TEST(Metrics, HaveTheValuesOfTheStatus) {
   EXPECT_EQ(value("arbiter_source_timeout_seconds", {{"source", "/stop"}}), INFINITY);
   EXPECT_EQ(value("arbiter_source_active", {{"source", "/stop"}}), 1);
   EXPECT_EQ(value("arbiter_source_away", {{"source", "/stop"}}), 1);
+  EXPECT_EQ(value("arbiter_source_trouble", {{"source", "/face"}}), 1);
+  EXPECT_EQ(value("arbiter_source_trouble", {{"source", "/stop"}}), 0);
+  EXPECT_EQ(value("arbiter_port_trouble", {{"port", "/gaze"}}), 1);
   EXPECT_EQ(value("arbiter_port_samples_taken_total", {{"port", "/gaze"}}), 201);
   EXPECT_EQ(value("arbiter_port_idles_total", {{"port", "/gaze"}}), 207);
   EXPECT_EQ(value("arbiter_port_winner_cannot_deliver", {{"port", "/idle"}}), 1);

@@ -40,7 +40,8 @@ inline wire::Status full_status() {
                  107,
                  108,
                  109,
-                 "a topic"};
+                 "a topic",
+                 true};
   wire::SourceStatus latched;
   latched.name = "/stop";
   latched.active = true;
@@ -66,7 +67,8 @@ inline wire::Status full_status() {
                 205,
                 206,
                 207,
-                "another topic"};
+                "another topic",
+                true};
   wire::ConnectionStatus connection{
       "/face", true, true, wire::End::kOpen, wire::End::kOpen, {}, 4, 301, 302, 303, 304,
       305,     306,  307};

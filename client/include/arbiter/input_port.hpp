@@ -188,7 +188,9 @@ class InputPort {
   [[nodiscard]] bool idle() noexcept { return detail::is_idle(*core_); }
   // Says where what is taken goes, for people: "/Base/cmd:i goes to …". As
   // OutputPort::describe().
-  void describe(std::string_view text) noexcept { detail::describe(*core_, text); }
+  void describe(std::string_view text) noexcept { detail::describe(*core_, text, false); }
+  // As OutputPort::describe_trouble().
+  void describe_trouble(std::string_view text) noexcept { detail::describe(*core_, text, true); }
   [[nodiscard]] const std::string& name() const noexcept { return detail::name(*core_); }
   // What it takes; untyped: anything.
   [[nodiscard]] const Type& type() const noexcept { return detail::type(*core_); }

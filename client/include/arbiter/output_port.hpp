@@ -118,7 +118,10 @@ class OutputPortBase {
   // 511 bytes, what is longer is cut; empty: nothing. The daemon hears it at most four times a
   // second, the last word always; so does the next daemon. Takes a lock and allocates: call it when
   // something has changed, off the data path.
-  void describe(std::string_view text) noexcept { detail::describe(*core_, text); }
+  void describe(std::string_view text) noexcept { detail::describe(*core_, text, false); }
+  // In its place, where something is wrong that somebody should mend: `arbiter why` marks it, and
+  // `arbiter doctor` reports it.
+  void describe_trouble(std::string_view text) noexcept { detail::describe(*core_, text, true); }
 
   // Whether another component waits for the port's name (OutputPortOptions::yields). Once true, it
   // stays true. Reads one word; any thread may call it while the port is open.
