@@ -34,12 +34,13 @@ void say(const std::string& what) {
 
 // What other programs call a verb; empty: none.
 std::string_view verb_for(std::string_view word) {
-  constexpr std::array<std::pair<std::string_view, std::string_view>, 8> kMeant{{
+  constexpr std::array<std::pair<std::string_view, std::string_view>, 9> kMeant{{
       {"explain", "why"},
       {"validate", "check"},
       {"watch", "top"},
       {"monitor", "top"},
       {"tail", "echo"},
+      {"hz", "echo --rate"},
       {"list", "status"},
       {"ls", "status"},
       {"info", "status"},

@@ -4,6 +4,7 @@
 #include <initializer_list>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "cli/live.hpp"
@@ -39,7 +40,7 @@ std::string holder(StatusPlace place, const auto& port) {
 // What its component says of it.
 void print_outside(std::ostream& out, const auto& port, const char* how) {
   if (!port.open || !port.open->described) return;
-  out << (port.open->trouble.value_or(false) ? "         ! " : "           ") << how
+  out << "           " << (port.open->trouble.value_or(false) ? "TROUBLE: " : "") << how
       << shm::printable(*port.open->described) << '\n';
 }
 
@@ -102,17 +103,37 @@ void print_strangers(std::ostream& out, StatusPlace place,
   }
 }
 
+void print_refusal(std::ostream& out, StatusPlace place, const wire::RefusalStatus& refusal) {
+  out << "refused to " << process_text(place, {refusal.node, refusal.pid, refusal.user});
+  if (place == StatusPlace::kHere) {
+    out << ' ' << seconds_text(shm::monotonic_now() - refusal.at) << " ago";
+  }
+  out << ": " << shm::printable(refusal.why) << '\n';
+}
+
 // Who has asked for a port that nobody has open, in vain.
 void print_refusals(std::ostream& out, StatusPlace place, const wire::Status& status,
                     std::optional<std::string> wire::RefusalStatus::*end, const auto& port) {
   if (port.open || port.away_pid) return;
   for (const wire::RefusalStatus& each : status.refusals) {
     if (each.*end != port.name) continue;
-    out << "           refused to " << process_text(place, {each.node, each.pid, each.user});
-    if (place == StatusPlace::kHere) {
-      out << ' ' << seconds_text(shm::monotonic_now() - each.at) << " ago";
+    out << "           ";
+    print_refusal(out, place, each);
+  }
+}
+
+// Of ports that are nowhere above: nobody has them open, and the model does not mention them.
+void print_other_refusals(std::ostream& out, StatusPlace place, const wire::Status& status) {
+  bool is_first = true;
+  for (const wire::RefusalStatus& each : status.refusals) {
+    const bool is_above = (each.output && status.find_source(*each.output) != nullptr) ||
+                          (each.input && status.find_input(*each.input) != nullptr);
+    if (is_above || (!each.output && !each.input)) continue;
+    if (std::exchange(is_first, false)) {
+      out << "\nrefused, of ports that the model does not mention\n";
     }
-    out << ": " << shm::printable(each.why) << '\n';
+    out << "  " << (each.output ? *each.output : *each.input) << "  ";
+    print_refusal(out, place, each);
   }
 }
 
@@ -176,12 +197,12 @@ void print_connection(std::ostream& out, const wire::ConnectionStatus& connectio
       << '\n';
 }
 
-void print_input(std::ostream& out, StatusPlace place, const wire::InputStatus& input,
-                 bool has_model) {
+void print_input(std::ostream& out, StatusPlace place, const wire::Status& status,
+                 const wire::InputStatus& input) {
   out << input.name << "  [" << holder(place, input) << type_of(input) << "]  ";
   const auto& useless = input.cannot_deliver;
   if (!input.arbitrated) {
-    out << "not arbitrated" << unmentioned(input, has_model);
+    out << "not arbitrated" << unmentioned(input, status.model.generation != 0);
   } else if (useless) {
     out << "idle: " << useless->source << " is selected, but cannot deliver: " << useless->why;
   } else {
@@ -195,6 +216,8 @@ void print_input(std::ostream& out, StatusPlace place, const wire::InputStatus& 
   }
   out << '\n';
   print_outside(out, input, "goes to ");
+  print_death(out, place, status, watch::kInputEnd, input);
+  print_refusals(out, place, status, &wire::RefusalStatus::input, input);
   for (const auto& connection : input.connections) {
     print_connection(out, connection, useless && useless->source == connection.source);
   }
@@ -218,11 +241,8 @@ void write_status(std::ostream& out, const wire::Status& status, StatusPlace pla
   out << "\ninput ports  (* winner, x selected but cannot deliver, - active and overridden, "
          "! active and "
          "sensed)\n";
-  for (const auto& input : status.inputs) {
-    print_input(out, place, input, has_model);
-    print_death(out, place, status, watch::kInputEnd, input);
-    print_refusals(out, place, status, &wire::RefusalStatus::input, input);
-  }
+  for (const auto& input : status.inputs) print_input(out, place, status, input);
+  print_other_refusals(out, place, status);
 }
 
 }  // namespace arbiter::cli

@@ -82,7 +82,9 @@ constexpr auto kForeignOperators = std::to_array<Foreign>({
 constexpr std::string_view kDoubleEquals = "==";
 constexpr auto kNoComparisons = std::to_array<Foreign>({
     {"!=", "write xor"},
-    {"=", "write iff or <->"},
+    {"=",
+     "write iff or <-> between conditions; /x alone says that /x is active, and \"not /x\" that "
+     "it is not"},
 });
 
 constexpr auto kForeignWords = std::to_array<Foreign>({

@@ -75,7 +75,6 @@ void ModelChanges::start(bool is_fresh) {
     begin_swap(swap);
   } catch (const std::exception& error) {
     if (is_fresh) throw;
-    ++reloads_refused_;
     if (why_refused_.empty()) why_refused_ = error.what();
     log_event({EventKind::kChangeRefused, {}, {}, {}, inherited}, log::level::err,
               "the last daemon's model stays in force: {}; `arbiter reload` reads the files again",

@@ -191,7 +191,9 @@ class PolicyReader {
     if (!id) {
       error("unknown-" + std::string(word), name,
             "this machine has no " + std::string(word) + " " + quote(name) +
-                "; correct the name, or make the " + std::string(word) + " first");
+                "; correct the name, or make the " + std::string(word) + " first" +
+                (name.starts_with("arbiter-") ? ": sudo systemd-sysusers makes those of the units"
+                                              : ""));
       return {};
     }
     return Policy::Subject{is_user ? Kind::kUser : Kind::kGroup, *id};
