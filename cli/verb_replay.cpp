@@ -114,6 +114,12 @@ int replay(const ReplayVerb& verb) {
               << " of another type than the last of "
               << rules::enumerate({changed.begin(), changed.end()}) << " became signals\n";
   }
+  if (replayed.samples != 0 && replayed.delivered == 0) {
+    std::cout << (replayed.discarded == 0
+                      ? "none was delivered: no input port that they are connected to is open"
+                      : "none was delivered: others won at each input port")
+              << '\n';
+  }
   return replayed.was_interrupted ? interrupted_exit_code(interrupts) : 0;
 }
 

@@ -325,11 +325,9 @@ void Replayer::arrive(Source& source, const Arrival& arrival, Nanoseconds at, Re
   }
   ++replayed.samples;
   const Bytes bytes(arrival.payload->data(), arrival.payload->size());
-  if (keeps_times_) {
-    port.publish_at(time_at(at), bytes);
-  } else {
-    port.publish(bytes);
-  }
+  const Outcome outcome = keeps_times_ ? port.publish_at(time_at(at), bytes) : port.publish(bytes);
+  replayed.delivered += outcome.delivered;
+  replayed.discarded += outcome.discarded;
 }
 
 }  // namespace arbiter::recorder
