@@ -4,6 +4,7 @@
 #include <iostream>
 #include <map>
 #include <optional>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -15,6 +16,7 @@
 #include "rules/text/names.hpp"
 #include "shm/clock.hpp"
 #include "shm/limits.hpp"
+#include "watch/port.hpp"
 
 namespace arbiter::cli {
 namespace {
@@ -210,19 +212,24 @@ class TapEcho {
 
 namespace {
 
+// Empty: the policy does not let us ask, or the daemon has just gone.
+std::optional<wire::Status> status_of(watch::Instance& instance) {
+  try {
+    return instance.status();
+  } catch (const std::exception&) {
+    return std::nullopt;
+  }
+}
+
 // Nothing comes then until somebody opens it. A name that only a watcher has given may be misspelt.
 void say_if_nobody_has_it(const std::string& port, watch::Instance& instance, bool is_in_model) {
-  wire::Status status;
-  try {
-    status = instance.status();
-  } catch (const std::exception&) {
-    return;  // the policy does not let us ask, or the daemon has just gone
-  }
+  const auto status = status_of(instance);
+  if (!status) return;
   std::vector<std::string_view> open;
-  for (const auto& each : status.sources) {
+  for (const auto& each : status->sources) {
     if (each.open) open.emplace_back(each.name);
   }
-  for (const auto& each : status.inputs) {
+  for (const auto& each : status->inputs) {
     if (each.open) open.emplace_back(each.name);
   }
   if (std::find(open.begin(), open.end(), port) != open.end()) return;
@@ -248,6 +255,12 @@ TapOf kind_of_port(const EchoOptions& options, watch::Instance* instance) {
     const bool is_in_model = source ? table.knows_source(*source) : table.knows_port(*port);
     say_if_nobody_has_it(options.port, *instance, is_in_model);
     return source ? TapOf::output : TapOf::input;
+  }
+  const auto status = status_of(*instance);
+  if (const auto meant = status ? watch::port_of_topic(*status, options.port) : std::string();
+      !meant.empty()) {
+    std::cerr << "arbiter: " << options.port << " is no port: " << meant << '\n';
+    return by_name();
   }
   std::vector<std::string_view> known;
   for (const auto& [id, name] : instance->port_names()) known.emplace_back(name);

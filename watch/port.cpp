@@ -1,20 +1,42 @@
 #include "watch/port.hpp"
 
+#include <string>
 #include <string_view>
 #include <utility>
 
 #include "rules/prove/table_rules.hpp"
 #include "rules/text/names.hpp"
+#include "shm/utf8.hpp"
 
 namespace arbiter::watch {
 namespace {
 
+// Whether it is called so by what a component says of its port: its last word before a comma.
+bool is_topic(std::string_view described, std::string_view name) {
+  described = described.substr(0, described.find(','));
+  const std::string word(described.substr(described.find_last_of(' ') + 1));
+  return word == name || word == "rt" + std::string(name) || '/' + word == name;
+}
+
+std::string port_of_topic_among(const auto& ports, const char* how, std::string_view name) {
+  for (const auto& port : ports) {
+    if (!port.open || !is_topic(port.open->described.value_or(""), name)) continue;
+    const std::string& described = *port.open->described;
+    return port.name + how + shm::printable(described.substr(0, described.find(',')));
+  }
+  return {};
+}
+
 shm::PortId require_port(Instance& instance, const std::string& name) {
   if (const auto found = instance.find_port(name)) return *found;
-  if (instance.status().find_source(name) != nullptr) {
+  const wire::Status status = instance.status();
+  if (status.find_source(name) != nullptr) {
     std::string message = name + " is an output port; give the input port first";
     message += ": arbiter why PORT " + name;
     throw WatchError(message);
+  }
+  if (const std::string port = port_of_topic(status, name); !port.empty()) {
+    throw WatchError(name + " is no port: " + port);
   }
   std::vector<std::string_view> known;
   for (const auto& [id, each] : instance.port_names()) known.push_back(each);
@@ -25,6 +47,11 @@ shm::PortId require_port(Instance& instance, const std::string& name) {
 }
 
 }  // namespace
+
+std::string port_of_topic(const wire::Status& status, std::string_view name) {
+  const std::string source = port_of_topic_among(status.sources, " comes from ", name);
+  return source.empty() ? port_of_topic_among(status.inputs, " goes to ", name) : source;
+}
 
 Port::Port(std::shared_ptr<Instance> instance, std::string name,
            std::shared_ptr<ModelLoader> models)

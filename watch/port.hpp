@@ -7,6 +7,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "rules/explain/explain.hpp"
@@ -42,6 +43,10 @@ struct KeptPicture {
   std::map<std::string, shm::ActivityWord> words;
   bool is_settled = true;
 };
+
+// Of a name that no port has, such as a topic's: "/Nav/cmd:o comes from DDS topic rt/cmd_nav",
+// where a component says so of its port. ROS 2 calls that topic /cmd_nav. Empty: nobody does.
+[[nodiscard]] std::string port_of_topic(const wire::Status& status, std::string_view name);
 
 class Port {
  public:

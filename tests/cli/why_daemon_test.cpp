@@ -83,7 +83,7 @@ TEST(WhyDaemon, SaysWhatComponentsSayOfTheirPorts) {
   auto rest = node.output_port<int>("/rest");
   auto track = node.output_port<int>("/track");
   auto arm = node.input_port<int>("/arm");
-  rest.describe("DDS topic rt/rest, no publisher matched");
+  rest.describe("DDS topic rt/rest-topic, no publisher matched");
   track.describe_trouble("iceoryx a/b/c, RouDi does not run\x1b[2J");
   arm.describe("DDS topic rt/arm, 1 subscriber matched");
   while (!daemon.source("/rest").contains("described") ||
@@ -93,11 +93,17 @@ TEST(WhyDaemon, SaysWhatComponentsSayOfTheirPorts) {
   EXPECT_THAT(
       why({"/arm"}),
       AllOf(HasSubstr("\n  /arm goes to DDS topic rt/arm, 1 subscriber matched\n"),
-            HasSubstr("\n  /rest comes from DDS topic rt/rest, no publisher matched\n"),
+            HasSubstr("\n  /rest comes from DDS topic rt/rest-topic, no publisher matched\n"),
             HasSubstr("\n  ! /track comes from iceoryx a/b/c, RouDi does not run\\x1b[2J\n")));
   EXPECT_THAT(codes(why_json({"/arm"})["obstacles"]), ElementsAre("outside"));
+  for (const char* topic : {"/rest-topic", "/rt/rest-topic"}) {
+    EXPECT_THAT(
+        arbiter({"why", topic}).err,
+        HasSubstr(std::string(topic) + " is no port: /rest comes from DDS topic rt/rest-topic\n"));
+  }
+  EXPECT_THAT(arbiter({"why", "/b/c"}).err, HasSubstr("no model and no component has named"));
   EXPECT_THAT(status_text(),
-              AllOf(HasSubstr("  comes from DDS topic rt/rest, no publisher matched\n"),
+              AllOf(HasSubstr("  comes from DDS topic rt/rest-topic, no publisher matched\n"),
                     HasSubstr("  goes to DDS topic rt/arm, 1 subscriber matched\n")));
   rest.describe("");
   await([&] { return !daemon.source("/rest").contains("described"); });
