@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <set>
+#include <string>
 #include <string_view>
 #include <utility>
 
@@ -47,10 +48,10 @@ void add_unknown(const StrangerStatus& stranger, std::vector<Obstacle>& result) 
 // keeps samples out.
 void add_outside(const std::string& name, const char* how, const auto& open,
                  std::vector<Obstacle>& result) {
-  if (open.described) {
-    result.push_back(
-        {"outside", name + how + shm::printable(*open.described), open.trouble.value_or(false)});
-  }
+  if (!open.described) return;
+  std::string text = name + how + shm::printable(*open.described);
+  if (is_stopped(open.component.pid)) text += " (as it said before it was stopped)";
+  result.push_back({"outside", std::move(text), open.trouble.value_or(false)});
 }
 
 shm::TypeInfo type_info(const std::optional<wire::SampleType>& type) {

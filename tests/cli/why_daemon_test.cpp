@@ -7,6 +7,7 @@
 #include <arbiter/arbiter.hpp>
 
 #include "tests/cli/why_program.hpp"
+#include "tests/client/component.hpp"
 #include "tests/support/await.hpp"
 #include "tests/support/daemon.hpp"
 
@@ -107,6 +108,18 @@ TEST(WhyDaemon, SaysWhatComponentsSayOfTheirPorts) {
                     HasSubstr("  goes to DDS topic rt/arm, 1 subscriber matched\n")));
   rest.describe("");
   await([&] { return !daemon.source("/rest").contains("described"); });
+}
+
+TEST(WhyDaemon, SaysThatAComponentDescribedItsPortBeforeItWasStopped) {
+  Daemon daemon(kOneDefault);
+  Component gateway("gateway");
+  ASSERT_EQ(gateway.tell("output /rest"), "open");
+  ASSERT_EQ(gateway.tell("describe /rest"), "done");
+  await([&] { return daemon.source("/rest").contains("described"); });
+  EXPECT_THAT(why({"/arm"}), HasSubstr("\n  /rest comes from a topic\n"));
+  gateway.process().stop();
+  EXPECT_THAT(why({"/arm"}),
+              HasSubstr("\n  /rest comes from a topic (as it said before it was stopped)\n"));
 }
 
 TEST(WhyDaemon, ThatHasLostItsStateSaysWhoRunsThatItDoesNotKnow) {

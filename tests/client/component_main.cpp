@@ -42,6 +42,7 @@ class Component {
     if (verb == "publish") return publish(port, words);
     if (verb == "signal") return answer(outputs_.at(port)->signal());
     if (verb == "deactivate") return outputs_.at(port)->deactivate(), "done";
+    if (verb == "describe") return outputs_.at(port)->describe("a topic"), "done";
     if (verb == "take") return answer(inputs_.at(port)->take());
     if (verb == "hold") return hold(port);
     if (verb == "hold-event") return hold_event(port);
