@@ -50,9 +50,15 @@ void Account::set_place(std::string place) {
   place_ = std::move(place);
 }
 
-void Account::set_obstacle(std::string_view text) {
+void Account::set_obstacle(std::string_view text, bool is_trouble) {
   const std::lock_guard lock(mutex_);
   obstacle_ = fitting(text, kMaxReason);
+  is_trouble_ = is_trouble && !text.empty();
+}
+
+bool Account::is_trouble() const {
+  const std::lock_guard lock(mutex_);
+  return is_trouble_;
 }
 
 void Account::set_last_reason(std::string_view text) {
@@ -131,6 +137,7 @@ std::string Account::text() const {
   add(unreadable, "unreadable");
   add(no_slot, "without memory");
   add(refused, "refused");
+  add(overflows, "or more lost to a full queue");
   text += counts;
   if (!last_reason_.empty()) text += "; " + last_reason_;
   return fitting(text, kMaxDescription);

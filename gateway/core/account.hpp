@@ -44,6 +44,7 @@ class Account {
   Count unreadable;  // it could not be read, its field is none, or it cannot be of its type
   Count no_slot;     // no memory for it, here or outside
   Count refused;     // by the middleware, when it was sent
+  Count overflows;   // of the middleware's queue: each time one sample at least was lost
   Count idle;        // idle samples sent
 
   // Twice a second, with CLOCK_MONOTONIC: how many samples pass in a second, and since when none
@@ -63,7 +64,9 @@ class Account {
   // Whether somebody at the other end is matched, or may be: nobody knows.
   [[nodiscard]] bool may_have_peers() const noexcept;
   // What keeps the topic from working as a whole, such as "RouDi does not run"; empty: nothing.
-  void set_obstacle(std::string_view text);
+  // `is_trouble`: somebody should mend it.
+  void set_obstacle(std::string_view text, bool is_trouble = true);
+  [[nodiscard]] bool is_trouble() const;
   // Why a sample was passed over, or an end refused, last: "QoS: the publisher is best effort, this
   // entry asks for reliable (reliability=\"best_effort\")". Kept, with the counts, until the next.
   void set_last_reason(std::string_view text);
@@ -86,6 +89,7 @@ class Account {
   mutable std::mutex mutex_;
   std::string place_;
   std::string obstacle_;
+  bool is_trouble_ = false;
   std::string last_reason_;
   std::int64_t peers_ = -1;  // not known
   bool at_least_ = false;

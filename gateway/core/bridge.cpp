@@ -21,7 +21,6 @@ constexpr shm::Nanoseconds kMillisecond = 1'000'000;
 // Between two looks whether another model is in force, of which nobody tells.
 constexpr shm::Nanoseconds kLookPeriod = 100 * kMillisecond;
 constexpr shm::Nanoseconds kTellPeriod = 500 * kMillisecond;  // how things stand
-constexpr shm::Nanoseconds kSayPeriod = 1000 * kMillisecond;  // of each entry
 constexpr int kRetryPeriod = 500;                             // ms, for the daemon
 // One lost datagram must not leave a robot driving, nor a gateway end late.
 constexpr int kLeaves = 3;
@@ -81,7 +80,12 @@ void Bridge::run(int stop) {
     part->sender = &middleware_.sender(part->gateway, part->entry, part->account);
   }
   make_node(stop);
-  if (!stops_) loop(stop);
+  try {
+    if (!stops_) loop(stop);
+  } catch (const LostPorts&) {
+    take_leave();
+    throw;
+  }
   take_leave();
   middleware_.stop();
 }
@@ -253,10 +257,12 @@ void Bridge::loop(int stop) {
 // A round that finds nothing costs little: there are ten in a second.
 void Bridge::look_after(shm::Nanoseconds now, bool all) {
   if (now < tend_at_ && !all) return;
+  const bool tells = all || now >= tell_at_;
+  // First: what the middleware subscribes to depends on T.
+  if (tells) max_ages_.update();
   if (now >= open_again_) open_closed();
   middleware_.tend();
-  if (all || now >= tell_at_) {
-    max_ages_.update();
+  if (tells) {
     watch_news();
     look_after_all();
     if (options_.on_turned_away && max_ages_.is_turned_away(options_.name)) {
@@ -310,15 +316,17 @@ void Bridge::look_after_all() {
     if (!part->is_open()) continue;
     part->account.look(now);
     std::string text = part->account.text();
-    if (text != part->described) {
-      if (part->incoming) part->incoming->describe(text);
-      if (part->outgoing) part->outgoing->describe(text);
+    const bool is_trouble = part->account.is_trouble();
+    if (text != part->described || is_trouble != part->is_trouble) {
+      if (part->incoming) part->incoming->describe(text, is_trouble);
+      if (part->outgoing) part->outgoing->describe(text, is_trouble);
       part->described = std::move(text);
+      part->is_trouble = is_trouble;
     }
-    if (now < part->say_again) continue;
+    if (!part->pauses.is_over(now)) continue;
     std::string state = part->account.state();
     if (state == part->said) continue;
-    part->say_again = now + kSayPeriod;
+    part->pauses.begin(now);
     say(Level::kInfo, part->entry.ports().front()->name +
                           (part->incoming ? " comes from " : " goes to ") + state);
     part->said = std::move(state);

@@ -23,6 +23,7 @@
 #include "gateway/core/max_ages.hpp"
 #include "gateway/core/middleware.hpp"
 #include "gateway/core/outgoing.hpp"
+#include "gateway/core/pauses.hpp"
 #include "gateway/core/spare_descriptors.hpp"
 #include "gateway/mapping/mapping.hpp"
 #include "shm/file_descriptor.hpp"
@@ -84,10 +85,11 @@ class Bridge {
     std::unique_ptr<Incoming> incoming;
     std::unique_ptr<Outgoing> outgoing;
     std::string said;  // in the log
-    shm::Nanoseconds say_again = 0;
+    Pauses pauses;
     std::string described;
-    Saying waiting;         // for its port
-    std::size_t first = 0;  // of its ports, to be opened
+    bool is_trouble = false;  // so described
+    Saying waiting;           // for its port
+    std::size_t first = 0;    // of its ports, to be opened
     [[nodiscard]] bool is_open() const { return incoming != nullptr || outgoing != nullptr; }
   };
 

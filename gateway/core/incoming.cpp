@@ -187,9 +187,11 @@ void Incoming::deactivate_all() noexcept {
   if (no_) no_->deactivate();
 }
 
-void Incoming::describe(std::string_view text) {
-  if (yes_) yes_->describe(text);
-  if (no_) no_->describe(text);
+void Incoming::describe(std::string_view text, bool is_trouble) {
+  for (auto* const port : {&yes_, &no_}) {
+    if (!*port) continue;
+    is_trouble ? (*port)->describe_trouble(text) : (*port)->describe(text);
+  }
 }
 
 }  // namespace arbiter::gateway

@@ -80,7 +80,7 @@ class Incoming {
 
   [[nodiscard]] const Entry& entry() const noexcept { return entry_; }
   // Tells the daemon how things stand. The gateway's loop.
-  void describe(std::string_view text);
+  void describe(std::string_view text, bool is_trouble);
 
  private:
   [[nodiscard]] std::optional<OutputPort<void>>& port_of(const Port& port) noexcept;

@@ -51,6 +51,7 @@ void MaxAges::update() {
   } else {
     try {
       instance_->update();
+      obstacle_.clear();
     } catch (const std::exception& error) {  // memory or descriptors are short
       obstacle_ = error.what();
     }

@@ -18,6 +18,13 @@ class NeedsNewProcess : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
+// The same where the daemon does not know what the gateway has open: to send still works, so that
+// whoever obeys an `out` entry can be told first.
+class LostPorts : public NeedsNewProcess {
+ public:
+  using NeedsNewProcess::NeedsNewProcess;
+};
+
 // All calls come from the bridge's thread.
 class Middleware {
  public:

@@ -65,7 +65,7 @@ void Outgoing::send_waiting(shm::Nanoseconds now) {
     // To send one to a subscriber that is full takes a while, here and at the ports before.
     const shm::Nanoseconds age = std::max(now, shm::monotonic_now()) - sample->stamp_ns();
     if (age > ages_.of(sample->source())) {
-      account_.late.add();
+      note_late();
       drop_draft();
       continue;
     }
@@ -210,7 +210,7 @@ bool Outgoing::end_turn(std::string_view source, shm::Nanoseconds max_age) noexc
     has_come = true;
     const shm::Nanoseconds stamp = sample->stamp_ns();  // each call reads the clock
     if (shm::monotonic_now() - stamp > max_age) {
-      account_.late.add();
+      note_late();
       continue;
     }
     const Sender::Result result = send_in_turn(*sample, stamp);
@@ -244,6 +244,12 @@ shm::Nanoseconds Outgoing::when_next() const noexcept {
   if (has_more_) return 0;
   if (entry_.idle.kind == Idle::Kind::kNothing) return shm::kForever;
   return idle_again_.value_or(shm::kForever);
+}
+
+// Whose T is for ever may have nothing newer to say.
+void Outgoing::note_late() noexcept {
+  is_unheard_ = true;
+  account_.late.add();
 }
 
 void Outgoing::account_for(Sender::Result result, std::size_t size) noexcept {

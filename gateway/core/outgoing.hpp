@@ -95,7 +95,8 @@ class Outgoing {
   // Sends what waits, unless it has waited for longer than its source's T: a gateway that was
   // stopped must not bring old commands to life. And the idle sample where it is due: when the port
   // has become idle, at the start, after peer_matched(), and every kIdlePeriod while it is idle. A
-  // port whose winner's last sample could not be sent counts as idle until one is sent.
+  // port whose winner's last sample could not be sent, or was too old, counts as idle until one is
+  // sent.
   // A sample's age is that at which it is sent, and not at `now`: others may have waited meanwhile.
   void run(shm::Nanoseconds now);
   // Before run(): whose samples may go straight on, and what lets the loop run() all. The loop.
@@ -126,7 +127,9 @@ class Outgoing {
 
   [[nodiscard]] const Entry& entry() const noexcept { return entry_; }
   // Tells the daemon how things stand.
-  void describe(std::string_view text) { port_.describe(text); }
+  void describe(std::string_view text, bool is_trouble) {
+    is_trouble ? port_.describe_trouble(text) : port_.describe(text);
+  }
 
  private:
   void send_waiting(shm::Nanoseconds now);
@@ -143,6 +146,7 @@ class Outgoing {
   [[nodiscard]] Bytes bytes_of(const Sample<void>& sample) const noexcept;
   void write_draft() noexcept;
   void drop_draft() noexcept;
+  void note_late() noexcept;
   void account_for(Sender::Result result, std::size_t size) noexcept;
   [[nodiscard]] shm::Nanoseconds when_next() const noexcept;
 
@@ -171,8 +175,8 @@ class Outgoing {
   std::atomic<shm::Nanoseconds> next_{shm::kForever};  // when_next()
   bool has_more_ = false;                              // run() has left samples to the next one
   bool has_ended_ = false;
-  // The winner's last sample could not be sent. Whoever obeys would go on with the one before, as
-  // if nobody commanded: so until one is sent it is told what an idle port is.
+  // The winner's last sample could not be sent, or not in time. Whoever obeys would go on with the
+  // one before, as if nobody commanded: so until one is sent it is told what an idle port is.
   bool is_unheard_ = false;
   std::optional<shm::Nanoseconds> idle_again_;  // when; empty: the port was not idle
 };

@@ -193,7 +193,7 @@ void leave_lost_ports(const Setup& setup, const Arguments& arguments, const Prog
   const std::string why =
       "the daemon does not know what this gateway has open, because the state of the last daemon "
       "is lost";
-  if (arguments.is_worker) throw NeedsNewProcess(why);
+  if (arguments.is_worker) throw LostPorts(why);
   if (reload.has_next()) return;
   try {
     reload.begin_anew(setup_of(arguments, kind, setup.settings.mappings, make));

@@ -9,6 +9,7 @@ namespace {
 // So many names of partitions of one end are looked at: it is a stranger that says them.
 constexpr std::uint32_t kMaxPartitions = 64;
 constexpr std::size_t kMaxPartitionName = 256;
+constexpr std::uint32_t kMaxRepresentations = 8;  // likewise; there are three
 
 dds_history_kind_t cyclone_history(History history) {
   return history == History::kKeepAll ? DDS_HISTORY_KEEP_ALL : DDS_HISTORY_KEEP_LAST;
@@ -36,7 +37,7 @@ void read_representations(const dds_qos_t& qos, AnnouncedQos& result) {
   std::uint32_t count = 0;
   dds_data_representation_id_t* kinds = nullptr;
   if (dds_qget_data_representation(&qos, &count, &kinds)) {
-    result.representations.assign(kinds, kinds + count);
+    result.representations.assign(kinds, kinds + std::min(count, kMaxRepresentations));
     dds_free(kinds);
   }
   // What an end says that says nothing (DDS-XTypes 7.6.3.1.1).
@@ -60,11 +61,12 @@ CycloneQos cyclone_qos(const Qos& qos, End end) {
                               ? DDS_DURABILITY_TRANSIENT_LOCAL
                               : DDS_DURABILITY_VOLATILE);
   const auto depth = static_cast<std::int32_t>(std::clamp<std::uint32_t>(qos.depth, 1, 1U << 20));
-  const dds_history_kind_t history = cyclone_history(qos.history);
-  dds_qset_history(to, history, depth);
-  if (end == End::kWriter) {  // what a late reader of a transient-local writer is given
-    dds_qset_durability_service(to, 0, history, depth, DDS_LENGTH_UNLIMITED, DDS_LENGTH_UNLIMITED,
-                                DDS_LENGTH_UNLIMITED);
+  dds_qset_history(to, cyclone_history(qos.history), depth);
+  if (end == End::kWriter) {
+    // What a late reader of a transient-local writer is given. Never all that was ever sent: that
+    // has no bound, and most of it no longer holds.
+    dds_qset_durability_service(to, 0, DDS_HISTORY_KEEP_LAST, depth, DDS_LENGTH_UNLIMITED,
+                                DDS_LENGTH_UNLIMITED, DDS_LENGTH_UNLIMITED);
   }
   if (qos.deadline) dds_qset_deadline(to, *qos.deadline);
   std::vector<const char*> partitions;

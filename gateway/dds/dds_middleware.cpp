@@ -1,5 +1,7 @@
 #include "gateway/dds/dds_middleware.hpp"
 
+#include <chrono>
+#include <system_error>
 #include <utility>
 
 #include "gateway/core/say.hpp"
@@ -12,8 +14,27 @@ namespace {
 
 // Often enough for who sends idle samples for a second.
 constexpr shm::Nanoseconds kOpenAgain = 200'000'000;
+// For Cyclone to join a domain. What takes longer, such as a name server that is silent, must not
+// hold up the loop.
+constexpr std::chrono::milliseconds kJoinsWithin{100};
+constexpr shm::Nanoseconds kLongToJoin = 2'000'000'000;
 // Cyclone needs some ten for each domain.
 constexpr std::size_t kDescriptorsOfDomain = 32;
+
+// On a thread of its own. Throws DdsError.
+std::unique_ptr<Domain> join_domain(const Gateway& gateway, const std::set<std::string>& topics,
+                                    const Bell& bell) {
+  const CycloneWords words;
+  try {
+    auto domain = std::make_unique<Domain>(gateway, topics, bell);
+    words.tell();
+    bell.ring();
+    return domain;
+  } catch (const DdsError&) {
+    if (words.last().empty()) throw;
+    throw DdsError("DDS cannot be joined: " + words.last());
+  }
+}
 
 // Equal: what one has sent last may be sent by the other. No name has a line break.
 std::string name_of_writer(const Gateway& gateway, const Entry& entry) {
@@ -54,7 +75,7 @@ DdsMiddleware::DdsMiddleware(const std::vector<Mapping>& mappings, const Bell& b
 
 void DdsMiddleware::hold_low_descriptors() noexcept {
   std::size_t closed = 0;
-  for (const auto& [id, site] : sites_) closed += site.domain ? 0 : 1;
+  for (const auto& [id, site] : sites_) closed += site.domain || site.joining.valid() ? 0 : 1;
   low_descriptors_.hold(closed * kDescriptorsOfDomain);
 }
 
@@ -187,13 +208,45 @@ void DdsMiddleware::subscribe_again(Site& site) {
   each_reader([&](EndPoint& end) { end.open(*site.domain); });
 }
 
+void DdsMiddleware::set_problem(Site& site, const std::string& problem) {
+  if (problem == site.problem) return;
+  site.problem = problem;
+  say(Level::kError, problem + "; trying again");
+  for (Account* const account : site.accounts) account->set_obstacle(problem);
+}
+
+bool DdsMiddleware::has_joined(Site& site) {
+  auto patience = std::chrono::milliseconds(0);
+  const shm::Nanoseconds now = shm::monotonic_now();
+  if (!site.joining.valid()) {
+    if (now < site.open_again) return false;
+    site.open_again = now + kLongToJoin;
+    low_descriptors_.let_go();
+    try {
+      site.joining = std::async(std::launch::async, join_domain, std::cref(*site.gateway),
+                                std::cref(site.topics), std::cref(bell_));
+    } catch (const std::system_error& error) {
+      throw DdsError(error.what());
+    }
+    patience = kJoinsWithin;
+  }
+  if (site.joining.wait_for(patience) != std::future_status::ready) {
+    if (now >= site.open_again) {
+      set_problem(site,
+                  "DDS is not joined yet: a name in peers= or in the configuration may be "
+                  "one that no name server answers for");
+    }
+    return false;
+  }
+  site.domain = site.joining.get();
+  hold_low_descriptors();
+  return true;
+}
+
 bool DdsMiddleware::open(Site& site) {
-  if (shm::monotonic_now() < site.open_again) return false;
   const CycloneWords words;
   try {
-    low_descriptors_.let_go();
-    site.domain.emplace(*site.gateway, site.topics, bell_);
-    hold_low_descriptors();
+    if (!has_joined(site)) return false;
     for (EndPoint* const end : site.ends) end->open(*site.domain);
     site.problem.clear();
     words.tell();
@@ -202,9 +255,7 @@ bool DdsMiddleware::open(Site& site) {
     const std::string problem =
         words.last().empty() ? error.what() : "DDS cannot be joined: " + words.last();
     close(site);
-    if (problem != site.problem) say(Level::kError, problem + "; trying again");
-    site.problem = problem;
-    for (Account* const account : site.accounts) account->set_obstacle(problem);
+    set_problem(site, problem);
     site.open_again = shm::monotonic_now() + kOpenAgain;
     return false;
   }
@@ -222,6 +273,7 @@ void DdsMiddleware::open(Site& site, EndPoint& end) {
 
 void DdsMiddleware::close(Site& site) noexcept {
   for (EndPoint* const end : site.ends) end->close();
+  site.joining = {};  // waits for it
   site.domain.reset();
   hold_low_descriptors();
 }

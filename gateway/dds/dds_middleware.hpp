@@ -1,6 +1,7 @@
 // DDS as a gateway's middleware, by Cyclone.
 #pragma once
 
+#include <future>
 #include <list>
 #include <map>
 #include <memory>
@@ -43,9 +44,11 @@ class DdsMiddleware : public Middleware {
     const Gateway* gateway = nullptr;
     std::set<std::string> topics;
     std::vector<const Entry*> entries;
-    std::optional<Domain> domain;
+    // It may not be joined yet: Cyclone waits for a name server, perhaps for long.
+    std::future<std::unique_ptr<Domain>> joining;
+    std::unique_ptr<Domain> domain;
     shm::Nanoseconds open_again = 0;
-    std::string problem;          // why it could not be opened last, which has been said
+    std::string problem;          // why it is not open, which has been said
     std::vector<EndPoint*> ends;  // each with its account
     std::vector<Account*> accounts;
   };
@@ -55,6 +58,10 @@ class DdsMiddleware : public Middleware {
   void add(Site& site, EndPoint& end, Account& account);
   void hold_low_descriptors() noexcept;
   void say_domains() const;
+  // Says it, and so does each account.
+  static void set_problem(Site& site, const std::string& problem);
+  // False: not yet. Throws DdsError.
+  bool has_joined(Site& site);
   // False: not now, and each account says why.
   bool open(Site& site);
   void open(Site& site, EndPoint& end);

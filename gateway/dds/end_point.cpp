@@ -169,13 +169,15 @@ void EndPoint::find_obstacles(const PeersOfTopic& peers) {
       warnings.emplace_back(guid, obstacles_.back());
     }
   }
-  warnings_.set(std::move(warnings), peers.ends);
   why_less_durable_ = why_less_durable();
+  is_trouble_ = !warnings.empty() || !why_less_durable_.empty();
+  warnings_.set(std::move(warnings), peers.ends);
   if (!why_less_durable_.empty()) {
     obstacles_.push_back("samples published before are not taken, because " +
                          std::string(why_less_durable_));
   }
   if (peers.has_more()) obstacles_.emplace_back("there are more ends than the gateway looks at");
+  has_mismatches_ = !others.empty();
   obstacles_.insert(obstacles_.end(), std::make_move_iterator(others.begin()),
                     std::make_move_iterator(others.end()));
 }
@@ -185,13 +187,14 @@ void EndPoint::tell_obstacles(std::uint32_t count) {
     account_.set_obstacle("");
     return;
   }
-  // An obstacle takes the place of the number of peers.
+  // An obstacle takes the place of the number of peers. Who does not match says that none does.
   std::string text;
-  if (count > 0) {
-    text = std::to_string(count) + (which_ == End::kReader ? " publisher" : " subscriber") +
-           (count == 1 ? "" : "s") + " matched; ";
+  if (count > 0 || !has_mismatches_) {
+    text = (count == 0 ? "no" : std::to_string(count)) +
+           (which_ == End::kReader ? " publisher" : " subscriber") + (count > 1 ? "s" : "") +
+           " matched; ";
   }
-  account_.set_obstacle(text + joined(obstacles_));
+  account_.set_obstacle(text + joined(obstacles_), is_trouble_);
 }
 
 void EndPoint::warn() {

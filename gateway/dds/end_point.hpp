@@ -90,6 +90,8 @@ class EndPoint {
   std::string_view why_less_durable_;   // as it was told last
   bool was_served_ = false;             // likewise
   std::vector<std::string> obstacles_;  // who does not match, and who goes past Arbiter
+  bool has_mismatches_ = false;         // among them
+  bool is_trouble_ = false;             // as Account::is_trouble()
   Warnings warnings_;
   Entity topic_entity_;
   mutable std::mutex in_use_;

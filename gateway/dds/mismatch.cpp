@@ -16,6 +16,9 @@ const char* word(const std::array<const char*, N>& words, int kind) {
                                                          : "something unknown";
 }
 
+// Bytes of the partitions of one peer, who may have made them to be slow, as may hundreds like it.
+constexpr std::size_t kMostComparedOfPeer = 100'000;
+
 constexpr std::array kReliabilities = {"best_effort", "reliable"};
 constexpr std::array kDurabilities = {"volatile", "transient_local", "transient", "persistent"};
 constexpr std::array kOwnerships = {"shared", "exclusive"};
@@ -56,6 +59,8 @@ class Comparison {
         reader_(reads_ ? mine_ : peer.qos),
         writer_(reads_ ? peer.qos : mine_) {}
 
+  // This entry is the reader.
+  [[nodiscard]] bool reads() const { return reads_; }
   [[nodiscard]] const AnnouncedQos& reader() const { return reader_; }
   [[nodiscard]] const AnnouncedQos& writer() const { return writer_; }
 
@@ -107,7 +112,8 @@ void compare_attributes(Comparison& pair) {
   if (std::find(asked.representations.begin(), asked.representations.end(),
                 offered.representations.front()) == asked.representations.end()) {
     pair.add("representation", word(kRepresentations, offered.representations.front()),
-             list(asked.representations), R"(representation="xcdr1" or "xcdr2")");
+             list(asked.representations),
+             pair.reads() ? "" : R"(representation="xcdr1" or "xcdr2")");
   }
 }
 
@@ -150,7 +156,9 @@ std::string compare_types(const DdsTopic& ours, const std::string& theirs) {
 }  // namespace
 
 bool may_meet(const Qos& ours, const AnnouncedQos& theirs) {
-  return theirs.has_more_partitions || share_partition(ours.partitions, theirs.partitions);
+  std::size_t patience = kMostComparedOfPeer;
+  return theirs.has_more_partitions ||
+         share_partition(ours.partitions, theirs.partitions, patience);
 }
 
 std::vector<std::string> mismatches(const OurEnd& ours, const Peer& peer) {

@@ -22,7 +22,7 @@ struct OurEnd {
 // does. What both sides' types look like inside is not compared: their names are.
 [[nodiscard]] std::vector<std::string> mismatches(const OurEnd& ours, const Peer& peer);
 
-// Whether they have a partition in common, or may have one.
+// Whether they have a partition in common, or may have one, because there are too many to compare.
 [[nodiscard]] bool may_meet(const Qos& ours, const AnnouncedQos& theirs);
 
 }  // namespace arbiter::gateway::dds

@@ -89,8 +89,9 @@ void ReaderCache::store(const ddsi_serdata& data, ddsi_tkmap_instance* instance,
     ddsi_tkmap_instance_ref(instance);
     instance_ = instance;
   }
-  // That an instance has been disposed of, or has lost its writer, is no sample.
-  if (data.kind == SDK_DATA && data.statusinfo == 0) taker_.take(*payload_of(&data), writer);
+  // That an instance has been disposed of, or has lost its writer, is no sample; one may come with
+  // it.
+  if (data.kind == SDK_DATA) taker_.take(*payload_of(&data), writer);
 }
 
 void ReaderCache::let_go() noexcept {

@@ -82,6 +82,7 @@ struct Session::Inlet {
   QueueFreshness freshness;
   std::uint32_t last_header = 0;  // of a chunk that was passed over
   std::size_t last_size = 0;
+  bool has_overflown = false;
 };
 
 Sender::Result ChunkSender::send(Bytes sample) noexcept {
@@ -300,6 +301,12 @@ void Session::take_all(Inlet& inlet) {
       }
     }
     inlet.subscriber.release(payload);
+  }
+  if (inlet.subscriber.hasMissedData()) {
+    inlet.in.account.overflows.add();
+    if (!std::exchange(inlet.has_overflown, true)) {
+      inlet.in.account.set_last_reason("its queue has lost samples; write a larger queue=");
+    }
   }
 }
 

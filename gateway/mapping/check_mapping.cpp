@@ -27,12 +27,16 @@ std::uint32_t domain_of(const Gateway& gateway) {
   return gateway.domain.value_or(domain_of_environment().value_or(0));
 }
 
-bool are_one_topic(const Placed& one, const Placed& other) {
+// A second or two: a gateway that reads its mapping again serves on the same thread.
+constexpr std::size_t kMostCompared = 1'000'000'000;
+
+// `patience`: as share_partition() has it.
+bool are_one_topic(const Placed& one, const Placed& other, std::size_t& patience) {
   const Entry& a = *one.entry;
   const Entry& b = *other.entry;
   if (a.dds && b.dds) {
     return domain_of(*one.gateway) == domain_of(*other.gateway) && a.dds->name == b.dds->name &&
-           share_partition(a.dds->qos.partitions, b.dds->qos.partitions);
+           share_partition(a.dds->qos.partitions, b.dds->qos.partitions, patience);
   }
   if (a.iceoryx && b.iceoryx) {
     return a.iceoryx->service == b.iceoryx->service && a.iceoryx->instance == b.iceoryx->instance &&
@@ -68,6 +72,7 @@ class MappingCheck {
     if (model_ == nullptr) return;
     list_model();
     for (const Placed& each : entries_) check_names(*each.entry);
+    for (const Placed& each : entries_) check_boolean(*each.entry);
     check_choices();
     check_latched();
     check_types();
@@ -119,16 +124,27 @@ class MappingCheck {
     for (const Placed& each : entries_) by_topic[each.entry->outside()].push_back(each);
     for (const auto& [topic, all] : by_topic) {
       for (std::size_t i = 0; i < all.size(); ++i) {
-        for (std::size_t j = 0; j < i; ++j) check_pair(all[j], all[i]);
+        bool is_second_out = false;
+        for (std::size_t j = 0; j < i && patience_ != 0; ++j) {
+          check_pair(all[j], all[i], is_second_out);
+        }
       }
     }
   }
 
-  void check_pair(const Placed& first, const Placed& second) {
+  // `is_second_out`: another `out` of its topic was found before, and said: one is enough.
+  void check_pair(const Placed& first, const Placed& second, bool& is_second_out) {
     const Entry& one = *first.entry;
     const Entry& other = *second.entry;
-    if ((one.is_in() && other.is_in()) || !are_one_topic(first, second)) return;
-    if (!one.is_in() && !other.is_in()) {
+    if (one.is_in() == other.is_in() && (one.is_in() || is_second_out)) return;
+    if (!are_one_topic(first, second, patience_)) return;
+    if (patience_ == 0) {
+      diagnostics_.error("too-many-partitions", second.entry->where,
+                         "the entries of " + other.outside() +
+                             " name too many partitions for each to be compared with the others; "
+                             "name fewer");
+    } else if (one.is_in() == other.is_in()) {
+      is_second_out = true;
       report_two_outs(one, other);
     } else {
       report_circle(one.is_in() ? other : one, one.is_in() ? one : other);
@@ -157,7 +173,8 @@ class MappingCheck {
 
   void check_idle(const Entry& entry) {
     if (entry.is_in() || entry.idle.kind != Idle::Kind::kNothing) return;
-    const bool may_be_zero = !entry.type || !has_strings(entry.type->name);
+    const bool may_be_zero = !entry.type || !has_strings(entry.type->name) ||
+                             size_without_frame(entry.type->name).has_value();
     diagnostics_.note("no-idle", entry.where,
                       "while " + entry.port->name + " is idle nothing is sent to " +
                           entry.outside() + ", so that whoever obeys it must stop by itself; add " +
@@ -237,6 +254,22 @@ class MappingCheck {
     if (entry.is_in()) return "nothing of it is delivered";
     return entry.idle.kind == Idle::Kind::kNothing ? "nothing comes of it"
                                                    : "nothing but the idle sample comes of it";
+  }
+
+  // A source that is only read, of a topic that says yes and no: both would be arrivals.
+  void check_boolean(const Entry& entry) {
+    if (!entry.is_in() || entry.choice || !entry.type) return;
+    const std::string& source = entry.port->name;
+    const auto is_of_it = [&](const auto& connection) { return connection.first == source; };
+    if (entry.type->name != "std_msgs/msg/Bool" || !sources_.contains(source) ||
+        std::any_of(connections_.begin(), connections_.end(), is_of_it)) {
+      return;
+    }
+    diagnostics_.warning("either-way", entry.where,
+                         "each sample of " + entry.outside() + " makes " + rules::quote(source) +
+                             " active, whether it says true or false; write true=\"…\" or "
+                             "false=\"…\" in place of port=\"…\"",
+                         {.ports = {}, .source = source});
   }
 
   // A Boolean that nobody repeats must not stay true for ever: where a condition asks for it, its
@@ -355,6 +388,7 @@ class MappingCheck {
   std::set<std::string> sources_, ports_;  // of the model
   std::vector<std::pair<std::string, std::string>> connections_;
   std::size_t suggestions_ = 0;
+  std::size_t patience_ = kMostCompared;
 };
 
 }  // namespace

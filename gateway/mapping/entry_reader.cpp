@@ -107,19 +107,25 @@ class EntryReader {
       return;
     }
     entry_.type = PortType{*name, size ? header() + *size : 0, entry_.iceoryx->alignment};
+    check_type(size ? header() + *size : 1);
+  }
+
+  // As a port's.
+  void check_type(std::size_t size) {
     shm::TypeInfo info;
-    info.set_name(*name);
-    info.size = size ? header() + *size : 1;
+    info.set_name(entry_.type->name);
+    info.size = size;
     if (const auto fault = shm::fault_of(info)) {
-      attributes_.error(
-          "invalid-type", "type",
-          rules::quote(*name) + " cannot be a type: " + *fault + "; write another name");
+      attributes_.error("invalid-type", "type",
+                        rules::quote(entry_.type->name) + " cannot be a type: " + *fault +
+                            "; write another name");
     }
   }
 
   void read_dds_type() {
     const std::string name = readable_type(entry_.dds->type);
     entry_.type = PortType{name, 0, 1};
+    if (!name.empty()) check_type(1);
     known_size_ = fixed_size_of(name);
     if (known_size_) make_room_for(header() + *known_size_, "type");
     // Of `out` also a zero sample's.
@@ -219,8 +225,10 @@ class EntryReader {
 
   void read_zero() {
     if (entry_.dds) {
-      if (!may_be_zero()) return;
-      entry_.idle.sample.resize(header() + *known_size_);
+      const auto without_frame = size_without_frame(entry_.type->name);
+      if (!without_frame && !may_be_zero()) return;
+      entry_.idle.sample.resize(header() + without_frame.value_or(known_size_.value_or(0)));
+      if (without_frame) entry_.idle.sample[header() + kFrameLengthOffset] = std::byte{1};
       const bool is_xcdr2 = entry_.dds->qos.representation == Representation::kXcdr2;
       entry_.idle.sample[1] = is_xcdr2 ? std::byte{7} : std::byte{1};  // little-endian
     } else if (!known_size_) {
@@ -241,7 +249,7 @@ class EntryReader {
     if (has_strings(type)) {
       attributes_.error("idle-size", "idle",
                         rules::quote(type) +
-                            " has a string in it, of which zero bytes are no sample; give a "
+                            " has strings or sequences, of which zero bytes are no sample; give a "
                             "sample: idle=\"file:…\"");
       return false;
     }

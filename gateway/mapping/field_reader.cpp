@@ -15,7 +15,9 @@ bool check_kind(Attributes& attributes, const SampleShape& shape, const Choice& 
     return false;
   }
   const bool is_boolean = choice.field == Field::kBoolean;
-  if (is_boolean && attributes.has("above")) return false;  // the field was refused
+  if (is_boolean && (attributes.has("above") || attributes.has("below"))) {
+    return false;  // the field was refused
+  }
   const Field known = shape.is_dds ? field_of(shape.type).value_or(choice.field) : choice.field;
   if (known == choice.field) return true;
   attributes.error(

@@ -140,6 +140,18 @@ std::optional<Field> field_of(std::string_view ros_type) {
   return known == nullptr ? std::nullopt : std::optional(known->field);
 }
 
+std::optional<std::size_t> size_without_frame(std::string_view ros_type) {
+  constexpr std::string_view kStamped = "Stamped";
+  constexpr std::size_t kHeader = 16;  // its last three bytes align what follows, in XCDR2, too
+  // A transform has a second name behind its header.
+  if (!has_strings(ros_type) || !ros_type.ends_with(kStamped) ||
+      ros_type == "geometry_msgs/msg/TransformStamped") {
+    return std::nullopt;
+  }
+  const auto body = fixed_size_of(ros_type.substr(0, ros_type.size() - kStamped.size()));
+  return body ? std::optional(kHeader + *body) : std::nullopt;
+}
+
 bool has_strings(std::string_view ros_type) {
   return std::find(kWithStrings.begin(), kWithStrings.end(), ros_type) != kWithStrings.end();
 }

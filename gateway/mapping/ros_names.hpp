@@ -34,6 +34,11 @@ namespace arbiter::gateway {
 [[nodiscard]] std::optional<std::size_t> fixed_size_of(std::string_view ros_type);
 // What each of their fields is.
 [[nodiscard]] std::optional<Field> field_of(std::string_view ros_type);
+// Of a common one that is a std_msgs/msg/Header and fields of one size, such as TwistStamped: how
+// many bytes it has if its frame's name is empty.
+[[nodiscard]] std::optional<std::size_t> size_without_frame(std::string_view ros_type);
+// Where that name's length is, which counts its final zero.
+inline constexpr std::size_t kFrameLengthOffset = 8;
 // Common ones of which zero bytes are no sample, since they contain a string.
 [[nodiscard]] bool has_strings(std::string_view ros_type);
 

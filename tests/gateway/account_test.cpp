@@ -7,6 +7,8 @@
 #include <set>
 #include <string>
 
+#include "gateway/core/pauses.hpp"
+
 namespace arbiter::gateway {
 namespace {
 
@@ -70,6 +72,14 @@ TEST(Account, SaysHowManySamplesPassInASecondAndSinceWhenNone) {
             "DDS topic rt/cmd_vel, the last sample has 52 bytes and is over an hour old");
 }
 
+TEST(Account, WhatAQueueHasLostIsSaidAsTheLeastThatItCanBe) {
+  Account account("iceoryx a/b/c", "publisher");
+  account.late.add();
+  account.overflows.add();
+  account.overflows.add();
+  EXPECT_EQ(account.text(), "iceoryx a/b/c; 1 late, 2 or more lost to a full queue");
+}
+
 // Each text that is another one goes to the daemon, and to all who look.
 TEST(Account, ASteadyTopicDoesNotChangeItsText) {
   Account account("DDS topic rt/cmd_vel", "subscriber");
@@ -85,12 +95,35 @@ TEST(Account, ASteadyTopicDoesNotChangeItsText) {
   EXPECT_THAT(account.text(), HasSubstr("at least 1000 idle samples"));
 }
 
+// Somebody may send two kinds of bad samples in turn, for a year.
+TEST(Pauses, BecomeLongerWhileSomethingIsSaidAgainAndAgain) {
+  Pauses pauses;
+  std::int64_t now = 1000 * kSecond;
+  const auto lines_within = [&](std::int64_t seconds) {
+    int lines = 0;
+    for (const std::int64_t end = now + seconds * kSecond; now < end; now += kSecond / 2) {
+      if (!pauses.is_over(now)) continue;
+      pauses.begin(now);
+      ++lines;
+    }
+    return lines;
+  };
+  EXPECT_GE(lines_within(10), 4);
+  EXPECT_LE(lines_within(86'400), 1500);
+  now += 2 * Pauses::kLongest + kSecond;  // nothing has changed
+  EXPECT_GE(lines_within(10), 4);
+}
+
 TEST(Account, AnObstacleStandsInThePlaceOfPeers) {
   Account account("iceoryx a/b/c", "subscriber");
   account.set_peers(3);
   account.set_obstacle("RouDi does not run");
   EXPECT_EQ(account.text(), "iceoryx a/b/c, RouDi does not run");
+  EXPECT_TRUE(account.is_trouble());
+  account.set_obstacle("there are many ends", false);
+  EXPECT_FALSE(account.is_trouble());
   account.set_obstacle("");
+  EXPECT_FALSE(account.is_trouble());
   EXPECT_EQ(account.text(), "iceoryx a/b/c, 3 subscribers matched");
 }
 

@@ -49,14 +49,22 @@ class PlayedMiddleware : public Middleware {
   Sender& sender(const Gateway&, const Entry&, Account&) override { return sender_; }
   void start(const std::vector<OpenIn>& ins, const std::vector<OpenOut>& outs) override {
     const std::lock_guard lock(mutex_);
-    for (const OpenIn& in : ins) ins_[in.incoming.entry().ports().front()->name] = &in.incoming;
+    for (const OpenIn& in : ins) {
+      const std::string& name = in.incoming.entry().ports().front()->name;
+      ins_[name] = &in.incoming;
+      accounts_[name] = &in.account;
+    }
+    for (const OpenOut& out : outs) accounts_[out.outgoing.entry().port->name] = &out.account;
     outs_ += outs.size();
   }
   void stop() noexcept override {
     if (const auto call = std::exchange(at_stop, {})) call();
   }
   // In each round of the loop.
-  void tend() override { ++tends_; }
+  void tend() override {
+    if (at_tend) at_tend();
+    ++tends_;
+  }
 
   [[nodiscard]] int tends() const { return tends_; }
   [[nodiscard]] std::vector<std::string> sent() {
@@ -71,16 +79,20 @@ class PlayedMiddleware : public Middleware {
     const std::lock_guard lock(mutex_);
     return outs_;
   }
+  [[nodiscard]] Account& account(const std::string& port) {
+    const std::lock_guard lock(mutex_);
+    return *accounts_.at(port);
+  }
+  [[nodiscard]] Incoming* in(const std::string& source) {
+    const std::lock_guard lock(mutex_);
+    return ins_.at(source);
+  }
   Incoming::Fate deliver(const std::string& source, const std::string& bytes) {
-    Incoming* in = nullptr;
-    {
-      const std::lock_guard lock(mutex_);
-      in = ins_.at(source);
-    }
-    return in->deliver(BytesSample(bytes), Time::max());
+    return in(source)->deliver(BytesSample(bytes), Time::max());
   }
 
   std::function<void()> at_stop{};  // once
+  std::function<void()> at_tend{};  // on the loop's thread; set before that runs
 
  private:
   // On the loop's thread and the test's.
@@ -101,6 +113,7 @@ class PlayedMiddleware : public Middleware {
   std::mutex mutex_;
   LockedSender sender_{mutex_};
   std::map<std::string, Incoming*> ins_;
+  std::map<std::string, Account*> accounts_;  // by their ports
   std::size_t outs_ = 0;
   std::atomic<int> tends_{0};
 };
@@ -108,8 +121,10 @@ class PlayedMiddleware : public Middleware {
 // A gateway that runs.
 class Running {
  public:
-  explicit Running(const std::string& name = "gateway", const std::string& entries = kEntries)
+  explicit Running(const std::string& name = "gateway", const std::string& entries = kEntries,
+                   std::function<void()> at_tend = {})
       : stop_(::eventfd(0, EFD_CLOEXEC)) {
+    middleware.at_tend = std::move(at_tend);
     mappings_.push_back(read_dds(entries).mapping);
     bridge_.emplace(BridgeOptions{name, "", [this] { ++signs_; }}, mappings_, Kind::kDds, bell_,
                     middleware);
@@ -345,6 +360,48 @@ TEST_F(Refused, TwoGatewaysOfTheSameMappingShareItAndOneTakesUpWhatTheOtherHad) 
     return two.middleware.serves("/Nav/cmd:o") && two.middleware.serves("/Joy/cmd:o") &&
            two.middleware.outs() == 1;
   });
+}
+
+TEST(Bridging, WhatKeepsATopicFromWorkingIsTroubleInTheStatus) {
+  test::Daemon daemon{kDriving};
+  Running gateway;
+  await([&] { return gateway.middleware.serves("/Nav/cmd:o") && gateway.middleware.outs() == 1; });
+  const auto is_trouble = [&](const char* source) {
+    const auto status = daemon.source(source);
+    return status.contains("described") && status["trouble"] == true;
+  };
+  gateway.middleware.account("/Nav/cmd:o").set_obstacle("its QoS does not match");
+  await([&] { return is_trouble("/Nav/cmd:o"); });
+  EXPECT_FALSE(is_trouble("/Joy/cmd:o"));
+  gateway.middleware.account("/Nav/cmd:o").set_obstacle("");
+  await([&] { return !is_trouble("/Nav/cmd:o"); });
+  gateway.middleware.account("/Base/cmd:i").set_obstacle("its QoS does not match");
+  await([&] { return daemon.input("/Base/cmd:i")["trouble"] == true; });
+}
+
+// What a topic that keeps samples brings may be an arrival only where T is for ever.
+TEST(Bridging, TheMiddlewareLooksWithTheTOfTheModelInForce) {
+  const auto model = [](bool is_forever) {
+    return std::string("<behaviors timeout='") + (is_forever ? "forever" : "60s") +
+           "'><behavior name='Drive'><config at='/Base/cmd:i'>/Nav/cmd:o</config></behavior>"
+           "</behaviors>";
+  };
+  constexpr int kLoads = 12;  // some of them right before the loop asks for T anyway
+  test::Daemon daemon{model(true)};
+  std::atomic<const Incoming*> nav{nullptr};
+  std::atomic<int> loads{0};
+  std::atomic<int> wrong{0};
+  Running gateway("gateway", kEntries, [&] {
+    const Incoming* const in = nav;
+    if (in == nullptr || loads == kLoads) return;
+    if (in->max_age().is_forever() != (loads % 2 == 0)) ++wrong;
+    daemon.load(model((loads + 1) % 2 == 0));
+    ++loads;
+  });
+  await([&] { return gateway.middleware.serves("/Nav/cmd:o"); });
+  nav = gateway.middleware.in("/Nav/cmd:o");
+  await([&] { return loads == kLoads; });
+  EXPECT_EQ(wrong, 0);
 }
 
 // Nobody else tells the robot, where no service manager does; and its last command would stay.

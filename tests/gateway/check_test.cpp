@@ -172,6 +172,43 @@ TEST(CheckMapping, TwoPortsThatCommandOneTopicAreNotArbitratedAgainstEachOther) 
   EXPECT_EQ(read.diagnostics.items()[0].about.ports, std::vector<std::string>{"/b:i"});
 }
 
+TEST(CheckMapping, OfManyThatCommandOneTopicEachIsFoundOnce) {
+  std::string outs;
+  for (const char* port : {"/a:i", "/b:i", "/c:i", "/d:i"}) outs += out("/cmd", port);
+  EXPECT_THAT(check(dds(outs), "").findings(), testing::SizeIs(3));
+  const auto parted = [](const std::string& partition) { return "partition='" + partition + "'"; };
+  const Read read =
+      check(dds(in("/cmd", "/Nav/cmd:o", parted("c")) + out("/cmd", "/a:i", parted("a")) +
+                out("/cmd", "/b:i", parted("a")) + out("/cmd", "/c:i", parted("a,c"))),
+            "");
+  std::vector<std::string> codes;
+  for (const auto& item : read.diagnostics.items()) codes.push_back(item.code);
+  EXPECT_THAT(codes, testing::UnorderedElementsAre("two-outs", "two-outs", "circle"));
+}
+
+// Somebody may have made them so that to compare each with each takes hours.
+TEST(CheckMapping, PartitionsThatTakeTooLongToCompareAreRefused) {
+  const auto partitions = [](const std::string& each) {
+    std::string list = each;
+    for (int i = 1; i < 64; ++i) list += "," + each;
+    return "partition='" + list + "'";
+  };
+  std::string slow;
+  for (int i = 0; i < 109; ++i) slow += "*a";
+  std::string entries;
+  for (int i = 0; i < 40; ++i) {
+    const std::string number = std::to_string(i);
+    entries += in("/cmd", "/in" + number + ":o", partitions(slow + "*b")) +
+               out("/cmd", "/out" + number + ":i", partitions(std::string(230, 'a')));
+  }
+  std::vector<std::string> errors;
+  const Read read = check(dds(entries), "");
+  for (const auto& item : read.diagnostics.items()) {
+    if (item.severity == rules::Severity::kError) errors.push_back(item.code);
+  }
+  EXPECT_THAT(errors, ElementsAre("too-many-partitions"));
+}
+
 TEST(CheckMapping, APortThatTheModelDoesNotMentionIsFound) {
   const Read read = check(dds(in("/nav", "/Nav/cmmd:o") + out("/cmd", "/Bas/cmd:i")));
   ASSERT_EQ(read.findings().size(), 2u);
@@ -208,7 +245,7 @@ TEST(CheckMapping, NothingIsSentToWhoeverMustStopByItself) {
   EXPECT_THAT(read.message(0), HasSubstr("add idle=\"zero\", or a sample"));
   // It would be refused.
   const Read stamped =
-      check(dds("<out topic='/c' type='geometry_msgs/msg/TwistStamped' port='/Base/cmd:i'/>"));
+      check(dds("<out topic='/c' type='nav_msgs/msg/Odometry' port='/Base/cmd:i'/>"));
   ASSERT_EQ(stamped.findings().size(), 1u);
   EXPECT_THAT(stamped.message(0), HasSubstr("add a sample that says stop: idle=\"file:…\""));
 }
@@ -241,6 +278,24 @@ TEST(CheckMapping, ABooleanThatAConditionAsksForMustNotLastForEver) {
   EXPECT_THAT(codes("/pressed:o iff /released:o", "200ms"),
               ElementsAre("forever-choice /pressed:o"));
   EXPECT_THAT(codes("all(/released*)", "forever"), ElementsAre(found));
+}
+
+// A stop that is pressed would count as released: both are messages.
+TEST(CheckMapping, ABooleanThatIsOnlyReadSaysWhichOfItsValuesCounts) {
+  const std::string model = with_estop("/released:o and not /pressed:o", "200ms");
+  const auto in = [](const std::string& type, const std::string& way) {
+    return dds("<in topic='/estop' type='" + type + "' " + way + "='/released:o'/>");
+  };
+  const Read read = check(in("std_msgs/msg/Bool", "port"), model);
+  ASSERT_EQ(read.findings().size(), 1u);
+  EXPECT_THAT(read.findings()[0], HasSubstr("warning either-way"));
+  EXPECT_THAT(read.message(0), HasSubstr("makes \"/released:o\" active, whether it says true or "
+                                         "false; write true="));
+  EXPECT_THAT(check(in("std_msgs/msg/Bool", "false"), model).findings(), IsEmpty());
+  EXPECT_THAT(check(in("std_msgs/msg/Empty", "port"), model).findings(), IsEmpty());
+  const std::string connected =
+      "<behaviors><arbiter at='/Light:i'><select from='/released:o'/></arbiter></behaviors>";
+  EXPECT_THAT(check(in("std_msgs/msg/Bool", "port"), connected).findings(), IsEmpty());
 }
 
 TEST(CheckMapping, TypesOfConnectedEndsAgree) {

@@ -32,6 +32,15 @@ TEST(Mapping, AnEntryHasOnePortOrThoseThatAFieldChooses) {
               ElementsAre("1:94 error invalid-value"));
 }
 
+TEST(Mapping, OfAFieldThatIsUnknownNothingElseIsSaid) {
+  for (const std::string port : {"above='/a:o' ", "below='/a:o' "}) {
+    const Read read = read_dds("<in topic='/a' type='std_msgs/msg/Float32' " + port +
+                               "threshold='1' field='x32'/>");
+    EXPECT_THAT(read.findings(), ElementsAre(HasSubstr("error invalid-value")));
+    EXPECT_THAT(read.message(), HasSubstr("field=\"x32\" is not known"));
+  }
+}
+
 // Most models ask for one of the two.
 TEST(Mapping, OneOfTwoSourcesIsEnough) {
   const std::string topic = "<in topic='/a' type='std_msgs/msg/Bool' ";

@@ -18,12 +18,31 @@ TEST(Mapping, ZerosAreNoSampleOfATypeWithStrings) {
   };
   EXPECT_THAT(out("geometry_msgs/msg/TwistStamped", "size='80'").message(),
               HasSubstr("has a string in it"));
+  for (const char* type : {"geometry_msgs/msg/TransformStamped", "nav_msgs/msg/Odometry"}) {
+    EXPECT_THAT(out(type, "").message(), HasSubstr("has strings or sequences, of which zero"));
+  }
   EXPECT_THAT(out("my_msgs/msg/Drive", "").message(),
               AllOf(HasSubstr("a zero \"my_msgs/msg/Drive\" is cannot be known; if it has"),
                     HasSubstr("add size=\"BYTES\"")));
   EXPECT_THAT(out("my_msgs/msg/Drive", "size='16'").findings(), IsEmpty());
   EXPECT_EQ(out("my_msgs/msg/Drive", "size='16'").entry().idle.sample.size(), 20u);
   EXPECT_THAT(out("geometry_msgs/msg/Twist", "size='44'").message(), HasSubstr("has 48 bytes"));
+}
+
+// A stamp of zero, and an empty frame, whose length counts its final zero.
+TEST(Mapping, AZeroOfAStampedTypeHasAHeader) {
+  const auto sample = [](const std::string& type, const std::string& more) {
+    const Read read =
+        read_dds("<out port='/a:i' topic='/a' type='" + type + "' idle='zero' " + more + "/>");
+    EXPECT_THAT(read.findings(), IsEmpty());
+    return read.entry().idle.sample;
+  };
+  std::vector<std::byte> expected(68);
+  expected[1] = expected[12] = std::byte{1};
+  EXPECT_EQ(sample("geometry_msgs/msg/TwistStamped", ""), expected);
+  expected[1] = std::byte{7};
+  EXPECT_EQ(sample("geometry_msgs/msg/TwistStamped", "representation='xcdr2'"), expected);
+  EXPECT_EQ(sample("geometry_msgs/msg/PointStamped", "").size(), 44u);
 }
 
 TEST(Mapping, AnIdleSampleComesFromAFileBesideTheMapping) {

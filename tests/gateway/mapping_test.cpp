@@ -194,6 +194,16 @@ TEST(Mapping, AllProblemsOfAFileAreReportedInOneGo) {
   EXPECT_THAT(read.message(10), HasSubstr("did you mean \"reliable\"?"));
 }
 
+// Its ports could never be opened.
+TEST(Mapping, ATypeThatNoPortCanHaveIsRefused) {
+  const Read dds = read_dds("<in topic='T' type='A\u200bB' port='/a:o'/>");
+  EXPECT_THAT(dds.findings(), ElementsAre("1:41 error invalid-type"));
+  EXPECT_THAT(dds.message(), HasSubstr("cannot be a type: "));
+  EXPECT_THAT(read_iceoryx("<in service='a' instance='b' event='c' port='/a:o' type='A\u200bB'/>")
+                  .findings(),
+              ElementsAre(HasSubstr("error invalid-type")));
+}
+
 TEST(Mapping, ADurationThatIsNoneIsToldWhatToWrite) {
   const auto max_age = [](const std::string& text) {
     return read_dds("<in topic='a' type='State' port='/a:o' max_age='" + text + "'/>").message();

@@ -52,6 +52,18 @@ TEST_F(StraightWithALock, APortThatBecomesIdleInATurnIsLeftToTheLoop) {
   EXPECT_EQ(calls_, 1) << "the loop knows that it is idle";
 }
 
+// The base would go on with what it was sent before.
+TEST_F(StraightWithALock, ASampleThatIsTooOldInATurnHasTheLoopSayStop) {
+  lead_navigation();
+  nav_.max_age().set(-1);
+  deliver(nav_, "old");
+  EXPECT_THAT(sender_.sent, IsEmpty());
+  EXPECT_EQ(account_.late.value(), 1u);
+  EXPECT_EQ(calls_, 1);
+  run();
+  EXPECT_THAT(sender_.sent, ElementsAre(kZeros));
+}
+
 TEST_F(StraightWithALock, APortThatBecomesIdleInATurnWithoutASampleIsLeftToTheLoop) {
   lead_navigation();
   ASSERT_TRUE(outgoing_.begin_turn(1));

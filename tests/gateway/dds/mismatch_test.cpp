@@ -105,6 +105,11 @@ TEST(Mismatch, ARepresentationIsTheWritersToOffer) {
   Peer writer = peer(End::kWriter);
   writer.qos.representations = {2, 0};
   EXPECT_THAT(mismatches({End::kReader, topic(), false}, writer), IsEmpty());
+  writer.qos.representations = {1};
+  EXPECT_EQ(mismatches({End::kReader, topic(), false}, writer),
+            std::vector<std::string>{"representation: the writer offers XML, this entry asks for "
+                                     "XCDR1 or XCDR2"})
+      << "of <in> the mapping has no such attribute";
 }
 
 TEST(Mismatch, TypesAndKeysAreCompared) {
@@ -133,6 +138,29 @@ TEST(Partition, AmongVeryManyAnyMayBe) {
   EXPECT_TRUE(may_meet(ours, announced(100)));
   EXPECT_FALSE(may_meet(ours, announced(64)));
   EXPECT_LE(announced(100).partitions.size(), 64U);
+}
+
+TEST(Representations, OfWhichThereAreVeryManyAreNotAllLookedAt) {
+  const CycloneQos qos(dds_create_qos());
+  std::vector<dds_data_representation_id_t> many;
+  for (dds_data_representation_id_t i = 0; i < 10'000; ++i) many.push_back(i);
+  dds_qset_data_representation(qos.get(), static_cast<std::uint32_t>(many.size()), many.data());
+  EXPECT_LE(read_announced(*qos).representations.size(), 8U);
+}
+
+// Hundreds of strangers may have made them so, and the gateway's loop compares them.
+TEST(Partition, AmongThoseThatTakeTooLongToCompareAnyMayBe) {
+  std::string slow = "*";
+  for (int i = 0; i < 120; ++i) slow += "a*";
+  Qos ours;
+  ours.partitions = {std::string(230, 'a')};
+  AnnouncedQos theirs;
+  theirs.partitions.assign(64, slow + "b");
+  EXPECT_TRUE(may_meet(ours, theirs));
+  for (int i = 0; i < 64; ++i) ours.partitions.push_back("ours" + std::to_string(i));
+  theirs.partitions.clear();
+  for (int i = 0; i < 64; ++i) theirs.partitions.push_back("theirs" + std::to_string(i));
+  EXPECT_FALSE(may_meet(ours, theirs)) << "as many as there may be, of some bytes each";
 }
 
 TEST(Peers, TheLastByteOfAGuidSaysWhetherThereIsAKey) {

@@ -125,6 +125,34 @@ TEST_F(Latched, OfATopicThatIsNotServedNobodyIsSaidToGoPastArbiter) {
   EXPECT_THAT(account().text(), testing::Not(testing::HasSubstr("past Arbiter")));
 }
 
+TEST_F(Latched, WhatElseIsAtATopicDoesNotHideThatNobodySubscribes) {
+  make("");
+  PeersOfTopic peers;
+  peers.crowds[End::kWriter].has_more = true;
+  topic_->look_at(peers);
+  EXPECT_EQ(account().text(),
+            "DDS topic rt/cmd, no subscriber matched; there are more ends than the gateway looks "
+            "at");
+  EXPECT_FALSE(account().is_trouble());
+}
+
+// Whoever is in another partition is probably meant to be.
+TEST_F(Latched, WhoDoesNotMatchIsTroubleUnlessInAnotherPartition) {
+  make("reliability='best_effort'");
+  PeersOfTopic peers;
+  Peer& other = peers.ends[Guid{1}];
+  other.type = "a::msg::dds_::B_";
+  other.qos.reliability = 1;
+  other.qos.representations = {0};
+  other.qos.partitions = {"elsewhere"};
+  topic_->look_at(peers);
+  EXPECT_FALSE(account().is_trouble()) << account().text();
+  other.qos.partitions = {};
+  ++peers.revision;
+  topic_->look_at(peers);
+  EXPECT_TRUE(account().is_trouble()) << account().text();
+}
+
 TEST_F(Latched, WhatWasSentLastIsStillThereWhenTheWriterIsOpenedAgain) {
   make("qos='latched'");
   EXPECT_EQ(send(one_), Sender::Result::kSent);
@@ -152,6 +180,14 @@ TEST_F(Latched, WhatWasToBeSentWhileTheWriterWasClosedIsThereWhenItIsOpen) {
   EXPECT_EQ(send(one_), Sender::Result::kNotReady);
   begin_anew();
   EXPECT_THAT(given(), testing::ElementsAre(one_));
+}
+
+// Otherwise the writer would keep all that it has ever sent, and whoever comes later be given it.
+TEST_F(Latched, WhoKeepsAllForThoseWhoAreThereGivesThoseWhoComeLaterTheLastSampleAlone) {
+  make("qos='latched' history='keep_all'");
+  EXPECT_EQ(send(one_), Sender::Result::kSent);
+  EXPECT_EQ(send(two_), Sender::Result::kSent);
+  EXPECT_THAT(given(), ::testing::ElementsAre(two_));
 }
 
 TEST_F(Latched, WhatIsNotLatchedIsNot) {

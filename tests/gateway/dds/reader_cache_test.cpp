@@ -67,6 +67,13 @@ TEST_P(ReaderCacheOf, ATopicGivesEachSampleWholeAndInOrderBeforeTheWriteReturns)
     write(head);
     write(head + std::string(100'000, 'x'));
     EXPECT_THAT(collected.all, ElementsAre(head + "a", head, head + std::string(100'000, 'x')));
+    // Its last word on the instance is a sample all the same.
+    Payload* const last = make_payload(
+        topic.type, Bytes(reinterpret_cast<const std::byte*>(head.data()), head.size()));
+    last->cyclone.statusinfo = 1;  // disposed of
+    last->cyclone.timestamp.v = dds_time();
+    EXPECT_EQ(dds_forwardcdr(writer.get(), &last->cyclone), DDS_RETCODE_OK);
+    EXPECT_EQ(collected.all.size(), 4u);
   }
   // The reader has gone; another may have the same cache.
   const Entity again(

@@ -171,14 +171,27 @@ TEST_F(Iceoryx, SamplesPassWhileNoDaemonRunsAndTheNextOneKnowsTheGateway) {
 
 TEST_F(Iceoryx, ADaemonThatKnowsNobodyLetsTheGatewayInAgain) {
   const Roudi roudi(directory_);
-  Spoken gate = gateway(directory_, in("low", "/Low:o") + out("/Base:i", "base"));
-  wait_for_description("/Low:o", "no publisher matched");
-  daemon_.terminate();
-  daemon_.lose_state();
-  daemon_.restart();
+  Spoken gate = gateway(directory_, in("low", "/Low:o") + out("/Base:i", "base", kZeros));
+  {
+    Spoken publisher = plain_publisher("low");
+    Spoken subscriber = plain_subscriber("base");
+    wait_for_both_ends();
+    publisher.say("drive");
+    ASSERT_TRUE(subscriber.hear("|drive"));
+    gate.process.stop();  // so that no other worker says it
+    daemon_.terminate();
+    daemon_.lose_state();
+    daemon_.restart();
+    ASSERT_TRUE(subscriber.hear("|zeros 4"));
+    gate.process.resume();
+  }
   ASSERT_TRUE(gate.hear("the state of the last daemon is lost; the gateway begins anew"));
   wait_for_description("/Low:o", "no publisher matched");
-  expect_that_samples_pass();
+  Spoken publisher = plain_publisher("low");
+  Spoken subscriber = plain_subscriber("base");
+  wait_for_both_ends();
+  publisher.say("drive");
+  EXPECT_TRUE(subscriber.hear("|drive"));
 }
 
 TEST_F(Iceoryx, AGatewayThatIsStartedFirstWaitsForTheDaemon) {
@@ -338,6 +351,33 @@ void stop(pid_t process) {
     }
     return true;
   });
+}
+
+// iceoryx gives way to what is newer, and tells only who asks. A worker that was stopped for too
+// long is replaced, and the next one has lost nothing.
+TEST_F(Iceoryx, WhatItsQueueLosesIsCounted) {
+  const Roudi roudi(directory_);
+  Spoken gate = gateway(directory_, in("low", "/Low:o", "queue='1'"));
+  Spoken publisher = plain_publisher("low");
+  const auto is_told = [&] {
+    return described("/Low:o").find(
+               "1 or more lost to a full queue; its queue has lost samples; write a larger "
+               "queue=") != std::string::npos;
+  };
+  while (!is_told()) {
+    wait_for_description("/Low:o", "1 publisher matched");
+    const pid_t worker = worker_of("/Low:o");
+    stop(worker);
+    for (int i = 0; i < 3; ++i) {
+      publisher.say("x");
+      ASSERT_TRUE(publisher.hear("published"));
+    }
+    ::kill(worker, SIGCONT);
+    wait_until([&] {
+      const auto source = daemon_.source("/Low:o");
+      return is_told() || source["open"] != true || source["component"]["pid"] != worker;
+    });
+  }
 }
 
 // A gateway that was stopped for longer than T discards what has waited meanwhile. On a machine
