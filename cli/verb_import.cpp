@@ -252,7 +252,7 @@ void add_names(CLI::App& verb, ImportVerbOptions& options) {
       ->check(name_of_type());
   verb.add_option("--idle", options.idle,
                   "What is sent while nobody commands: zero (stop), none (as the multiplexers "
-                  "do), or auto: zero if the type is geometry_msgs/msg/Twist")
+                  "do), or auto: zero if the type is Twist or TwistStamped of geometry_msgs")
       ->type_name("WHAT")
       ->check(one_of({"auto", "zero", "none"}));
   verb.add_option("--domain", options.import.domain,

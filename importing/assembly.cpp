@@ -91,19 +91,17 @@ std::string Assembly::behaviour_of(const MuxEntry& entry) {
   return unused(name, behaviours_);
 }
 
-void Assembly::set_types(Plan& plan, const std::optional<rules::Location>& stamped,
-                         const rules::Location& where) {
+void Assembly::set_types(Plan& plan, bool is_stamped, const rules::Location& where) {
   plan.domain = options_.domain;
   plan.mapping_remark = "Correct the topics if the launch file remaps them.";
   if (!is_ros2_) plan.mapping_remark += " Those of ROS 1 come and go through ros1_bridge.";
-  const bool is_of_file = options_.type.empty() && stamped.has_value();
-  plan.type = !options_.type.empty() ? options_.type : is_of_file ? kTwistStamped : kTwist;
-  const bool is_fixed = plan.type == kTwist;
+  plan.type = !options_.type.empty() ? options_.type : is_stamped ? kTwistStamped : kTwist;
+  const bool is_fixed = plan.type == kTwist || plan.type == kTwistStamped;
   if (options_.idle == IdleChoice::kZero || (options_.idle == IdleChoice::kByType && is_fixed)) {
     plan.idle = "zero";
   }
   if (options_.idle == IdleChoice::kByType && !is_fixed) {
-    diagnostics_.warning("nothing-when-idle", is_of_file ? *stamped : where,
+    diagnostics_.warning("nothing-when-idle", where,
                          "nothing is sent while nobody commands, since zeros are no " + plan.type +
                              "; record a sample that stops the robot and name it in the mapping "
                              "(idle=\"file:…\"), or rely on the time-out of the robot's driver");

@@ -29,9 +29,8 @@ class Assembly {
   // The behaviour's name: the entry's, but for what means something to an <inhibition> or a define.
   std::string behaviour_of(const MuxEntry& entry);
 
-  // Type and idle; `stamped`: where the file says so, if it does.
-  void set_types(Plan& plan, const std::optional<rules::Location>& stamped,
-                 const rules::Location& where);
+  // Type and idle; `is_stamped`: the file says so.
+  void set_types(Plan& plan, bool is_stamped, const rules::Location& where);
 
  private:
   const ImportOptions& options_;

@@ -71,7 +71,7 @@ class CmdVelMuxImport {
     });
     for (std::size_t i = 0; i < inputs_.size(); ++i) plan_input(i);
     set_output(parameter->entry->key.where);
-    assembly_.set_types(plan_, {}, parameter->entry->key.where);
+    assembly_.set_types(plan_, false, parameter->entry->key.where);
     if (!diagnostics_.has_errors()) say_what_is_not_kept();
     return std::move(plan_);
   }

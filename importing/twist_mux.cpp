@@ -77,7 +77,7 @@ class TwistMuxImport {
                                                   : topics_.front().topic.where;
     assembly_.set_output(plan_, "cmd_vel_out", where);
     if (!diagnostics_.has_errors()) note_unsaid_stamp();
-    assembly_.set_types(plan_, stamped_, where);
+    assembly_.set_types(plan_, is_stamped_, where);
     // SystemDefaultsQoS(); what crosses from ROS 1 is reliable.
     if (parameters_.is_ros2()) plan_.qos = "system_default";
     plan_.timeout_remark =
@@ -101,17 +101,22 @@ class TwistMuxImport {
         if (key == "topics" || key == "locks") continue;
         if (key == "use_stamped") {
           says_whether_stamped_ = true;
-          if (read_boolean(entry, diagnostics_).value_or(false)) stamped_ = entry.key.where;
+          if (read_boolean(entry, diagnostics_).value_or(false)) is_stamped_ = true;
         } else if (key == "use_sim_time") {
           if (!read_boolean(entry, diagnostics_).value_or(false)) continue;
           diagnostics_.note("own-clock", entry.key.where,
                             "Arbiter goes by the machine's own clock: a timeout takes as long in a "
                             "simulation that is slower or faster; nothing to do on the robot");
+        } else if (const auto meant = rules::find_similar(key, {"topics", "locks"})) {
+          diagnostics_.error("unknown-key", entry.key.where,
+                             rules::quote(key) + " is nothing that twist_mux reads; did you mean " +
+                                 rules::quote(*meant) +
+                                 "? Without it, the model would lack what it holds");
         } else {
-          diagnostics_.warning("unknown-key", entry.key.where,
-                               "the import does not read " + rules::quote(key) +
-                                   rules::advise(key, {"topics", "locks", "use_stamped"},
-                                                 "look whether it decides anything"));
+          diagnostics_.warning(
+              "unknown-key", entry.key.where,
+              "the import does not read " + rules::quote(key) +
+                  rules::advise(key, {"use_stamped"}, "look whether it decides anything"));
         }
       }
     }
@@ -175,7 +180,8 @@ class TwistMuxImport {
                          rules::quote(entry.name) + " has no timeout: while nobody publishes " +
                              topic +
                              ", because its publisher died or never started, nothing is "
-                             "locked; repeat the message and give the lock a timeout");
+                             "locked, nor while a best effort publisher does, which the mapping "
+                             "does not hear; repeat the message and give the lock a timeout");
   }
 
   void warn_of_negative(const MuxEntry& entry) {
@@ -282,9 +288,9 @@ class TwistMuxImport {
   Assembly assembly_;
   Plan plan_;
   std::vector<MuxEntry> topics_, locks_;
-  std::vector<Chosen> chosen_;              // the most important first
-  std::vector<std::size_t> lock_indices_;   // in the plan, of each of locks_
-  std::optional<rules::Location> stamped_;  // where the file says so
+  std::vector<Chosen> chosen_;             // the most important first
+  std::vector<std::size_t> lock_indices_;  // in the plan, of each of locks_
+  bool is_stamped_ = false;
   bool says_whether_stamped_ = false;
 };
 

@@ -159,7 +159,7 @@ TEST(Import, WritesNoMappingThatAGatewayWouldRefuse) {
   TemporaryDirectory directory;
   const auto yaml = directory.write("mux.yaml", kMux);
   const std::string folder = directory.path() + "/mux";
-  for (const std::string type : {"geometry_msgs/msg/TwistStamped", "my_msgs/msg/Command"}) {
+  for (const std::string type : {"nav_msgs/msg/Odometry", "my_msgs/msg/Command"}) {
     const auto result = arbiter(
         {"import", "twist_mux", yaml, "--out-dir", folder, "--type", type, "--idle", "zero"});
     EXPECT_EQ(result.exit_code, 1);
@@ -173,11 +173,11 @@ TEST(Import, WritesNoMappingThatAGatewayWouldRefuse) {
   const auto result =
       arbiter({"import", "twist_mux", directory.write("s.yaml", stamped), "--out-dir", folder});
   EXPECT_EQ(result.exit_code, 0);
-  EXPECT_THAT(result.err, HasSubstr("s.yaml:1:31: warning: nothing is sent while nobody commands"));
+  EXPECT_EQ(result.err, "");
   const auto check =
       arbiter({"check", folder + "/model.xml", "--gateway", folder + "/mapping.xml"});
   EXPECT_EQ(check.exit_code, 0) << check.err;
-  EXPECT_THAT(check.err, testing::Not(HasSubstr("idle=\"zero\"")));
+  EXPECT_THAT(check.err, testing::Not(HasSubstr("no-idle")));
 }
 
 // Whoever corrects a file wants to know all that is to be corrected.
@@ -197,7 +197,7 @@ TEST(Import, SaysWhatIsWrongWithTheFileAndWithTheMappingInOneRun) {
   EXPECT_THAT(result.err, HasSubstr("[idle-size]; leave out --idle zero"));
   const auto stamped = kMux + "- {name: x, topic: x, timeout: 0.5}\nuse_stamped: true\n";
   result = arbiter({"import", "twist_mux", directory.write("s.yaml", stamped), "--out-dir", folder,
-                    "--idle", "zero"});
+                    "--type", "my_msgs/msg/Command", "--idle", "zero"});
   EXPECT_EQ(result.exit_code, 1);
   EXPECT_THAT(result.err, HasSubstr("s.yaml:4:3: error: \"x\" has no `priority`"));
   EXPECT_THAT(result.err, HasSubstr("[idle-size]; leave out --idle zero"));

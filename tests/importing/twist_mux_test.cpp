@@ -248,14 +248,26 @@ TEST(TwistMux, StampedTwistsAreTakenFromTheFile) {
   const auto imported = import_mux(
       "m: {ros__parameters: {use_stamped: true, use_sim_time: true, spare: 1,\n"
       "  topics: {a: {topic: a, timeout: 0.5, priority: 5}}}}\n");
-  EXPECT_THAT(imported.findings(), ElementsAre("1:42 note own-clock", "1:62 warning unknown-key",
-                                               "1:23 warning nothing-when-idle"));
+  EXPECT_THAT(imported.findings(), ElementsAre("1:42 note own-clock", "1:62 warning unknown-key"));
+  EXPECT_EQ(imported.plan->idle, "zero");
   EXPECT_EQ(imported.plan->type, importing::kTwistStamped);
   EXPECT_THAT(
       import_mux("m: {ros__parameters: {use_stamped: 1, topics: {a: {topic: a, timeout: 0.5, "
                  "priority: 5}}}}")
           .findings(),
       ElementsAre("1:36 error wrong-type"));
+}
+
+// A model without its locks decides, too, and nobody would notice.
+TEST(TwistMux, AMisspeltSectionIsAnError) {
+  for (const std::string key : {"lock", "topic", "Locks"}) {
+    const auto imported = import_mux(
+        "m: {ros__parameters: {use_stamped: false, topics: {a: {topic: a, timeout: 0.5, priority: "
+        "5}},\n" +
+        key + ": {e: {topic: e, timeout: 0.5, priority: 9}}}}\n");
+    EXPECT_THAT(imported.findings(), ElementsAre("2:1 error unknown-key"));
+    EXPECT_THAT(imported.message("unknown-key"), HasSubstr("did you mean"));
+  }
 }
 
 // Names are whatever a file has; each becomes a port, a behaviour and a comment.
