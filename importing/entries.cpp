@@ -163,10 +163,11 @@ class EntryReader {
   rules::Diagnostics& diagnostics_;
 };
 
-// In ROS 2 entries are parameters, which are sorted: "topics.a-b.topic" is before "topics.a.topic".
+// In ROS 2 entries are parameters, which are sorted, and the first one of an entry counts:
+// "topics.a-b.priority" is before "topics.a.priority", and so is "topics.a.b.priority".
 void sort_as_ros2(std::vector<MuxEntry>& entries) {
   std::stable_sort(entries.begin(), entries.end(), [](const MuxEntry& a, const MuxEntry& b) {
-    return a.name + "." < b.name + ".";
+    return a.name + ".priority" < b.name + ".priority";
   });
 }
 

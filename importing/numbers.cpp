@@ -17,8 +17,10 @@ std::string_view without_sign(std::string_view text) {
 }
 
 // Of a number with an exponent ROS 1's reader makes a text, but where it has a point and the
-// exponent a sign.
+// exponent a sign; and of one with a sign, where no digit is before the point.
 bool is_read_differently(std::string_view text) {
+  const std::string_view digits_first = without_sign(text);
+  if (digits_first.size() != text.size() && digits_first.starts_with('.')) return true;
   const std::size_t exponent = text.find_first_of("eE");
   if (exponent == std::string_view::npos) return false;
   const std::string_view digits = text.substr(exponent + 1);
@@ -94,7 +96,8 @@ Number<shm::Nanoseconds> read_seconds(const YamlNode& node) {
   if (is_read_differently(node.text)) {
     return {{},
             rules::quote(node.text) +
-                " is a text to some readers; write it without an exponent, or as in 5.0e-1"};
+                " is a text to some readers; write it as in -0.5, without an exponent, or as in "
+                "5.0e-1"};
   }
   const shm::Nanoseconds rounded = std::llround(value * 1e9);
   if (rounded == 0 && value != 0) {

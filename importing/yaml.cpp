@@ -46,6 +46,7 @@ class Reader {
   Reader& operator=(const Reader&) = delete;
 
   std::optional<YamlNode> document() {
+    if (has_many_tag_directives()) return {};
     if (!next() || !next()) return {};  // the stream's start is behind us
     if (event_.type == YAML_STREAM_END_EVENT) return refuse("the file is empty; nothing to import");
     if (!next()) return {};
@@ -56,6 +57,19 @@ class Reader {
   }
 
  private:
+  // libyaml compares each with all before it; and there is no tag that they could be for.
+  bool has_many_tag_directives() {
+    constexpr int kMost = 10;
+    std::size_t at = std::string_view::npos;
+    for (int i = 0; i <= kMost; ++i) {
+      at = file_.content().find("%TAG", at + 1);
+      if (at == std::string_view::npos) return false;
+    }
+    error(file_.locate(at),
+          "the file has more than " + std::to_string(kMost) + " times %TAG; remove all of them");
+    return true;
+  }
+
   bool next() {
     yaml_event_delete(&event_);
     if (yaml_parser_parse(&parser_, &event_) != 0) return true;

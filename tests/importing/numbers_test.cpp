@@ -55,7 +55,7 @@ TEST(Numbers, WhatIsNoNumberOfSecondsSaysWhy) {
         "1:30", "--1", "+-1", "+", "-", ".", "e5", "true"}) {
     EXPECT_THAT(problem_of_seconds(text), HasSubstr("is not a number")) << text;
   }
-  for (const char* text : {"5e-1", "1e3", "1.0e3", "1E+1"}) {
+  for (const char* text : {"5e-1", "1e3", "1.0e3", "1E+1", "-.5", "+.5"}) {
     EXPECT_THAT(problem_of_seconds(text), HasSubstr("is a text to some readers")) << text;
   }
   EXPECT_THAT(problem_of_seconds("010"), HasSubstr("octal"));

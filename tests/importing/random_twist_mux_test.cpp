@@ -76,7 +76,8 @@ class TwistMux {
 };
 
 std::vector<Handle> random_handles(Random& random, const std::string& prefix, int least, int most) {
-  static const std::vector<std::string> kNames{"a", "a-b", "ab", "B", "joy", "nav", "z_1", "0"};
+  static const std::vector<std::string> kNames{"a",   "a-b", "a.b", "ab", "B",
+                                               "joy", "nav", "z_1", "0"};
   static const std::vector<int> kPriorities{0, 1, 2, 2, 5, 10, 10, 100, 254, 255, 256, 1000, -7};
   static const std::vector<std::pair<std::string, Nanoseconds>> kTimeouts{
       {"0.1", 100'000'000}, {"0.25", 250'000'000},  {"0.3", 300'000'000},

@@ -113,6 +113,15 @@ TEST(Yaml, NothingMakesItLarge) {
   EXPECT_THAT(parse(repeated("# much\n", 200'000)).error(), HasSubstr("larger than the limit"));
 }
 
+// Which libyaml compares with each other: a mebibyte of them took a quarter of a minute.
+TEST(Yaml, FewTagDirectivesAreTaken) {
+  std::string directives;
+  for (int i = 0; i < 10; ++i) directives += "%TAG !" + std::to_string(i) + "! x\n";
+  EXPECT_TRUE(parse(directives + "---\na: 1\n").root);
+  EXPECT_EQ(parse(directives + "%TAG !z! x\n---\na: 1\n").error(),
+            "11:1 the file has more than 10 times %TAG; remove all of them");
+}
+
 TEST(Yaml, WhatIsNoTextIsRefused) {
   EXPECT_THAT(parse(std::string("a: \0", 4)).error(), HasSubstr("1:4 "));
   EXPECT_THAT(parse("a: \x1b[31m\n").error(), HasSubstr("1:4 "));
