@@ -131,8 +131,8 @@ std::vector<WinnerChange> winners_of(const Run& run, Models& models) {
   return follow(
       run,
       [&](WinnerTrack& track, const ModelChange& model, Nanoseconds time) {
-        const Judge* judge = models.judge(run, model.generation);
-        track.set_rules(judge == nullptr ? nullptr : rule_table_of(judge->simulation()),
+        const auto judge = models.judge(run, model.generation);
+        track.set_rules(judge == nullptr ? nullptr : rule_table_of(judge->simulation(), judge),
                         model.generation, time);
       },
       [](const std::string& /*source*/, const Step& step) { return step.word; });

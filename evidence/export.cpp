@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <functional>
 #include <map>
+#include <memory>
 #include <set>
 #include <string>
 #include <utility>
@@ -25,7 +26,7 @@ struct TraceRow {
   bool is_deactivation = false;
 };
 
-const Judge* first_judge(const Run& run, Models& models) {
+std::shared_ptr<const Judge> first_judge(const Run& run, Models& models) {
   return run.models.empty() ? nullptr : models.judge(run, run.models.begin()->first);
 }
 
@@ -33,7 +34,7 @@ const Judge* first_judge(const Run& run, Models& models) {
 Nanoseconds arrival_before(const std::string& source, const Step& step, const Run& run,
                            Models& models) {
   if (!shm::is_finite(step.word)) return step.word & ~shm::kForeverFlag;
-  const Judge* judge = first_judge(run, models);
+  const auto judge = first_judge(run, models);
   const Nanoseconds time =
       judge == nullptr ? run.start : shm::arrival_of(step.word, judge->timeout(source));
   return time >= 0 && time <= run.start ? time : run.start;
@@ -136,7 +137,7 @@ class DecisionRows {
   // but the arrival may have changed who wins.
   std::vector<std::string> sensing_ports(const rules::TraceEvent& event, std::uint64_t generation) {
     std::vector<std::string> ports;
-    const Judge* judge = models_.judge(run_, generation);
+    const auto judge = models_.judge(run_, generation);
     if (judge == nullptr || !judge->simulation().knows(event.source)) return ports;
     const rules::Simulation& simulation = judge->simulation();
     const shm::SourceId source = simulation.source_id(event.source);

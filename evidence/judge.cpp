@@ -14,10 +14,12 @@ constexpr std::size_t kMostMoments = 64;
 
 constexpr ActivityWord kActive = shm::kForeverFlag;
 
-// The steps that a source had surely taken before a moment, and those that it may have taken.
+// The steps that a source had surely taken before a moment, and those that it may have taken: so
+// many of these that it may be in any state, or all.
 struct Reached {
   std::size_t surely = 0;
   std::size_t perhaps = 0;
+  bool has_more = false;
 };
 
 Reached reached(const SourceHistory& history, Nanoseconds from, Nanoseconds to) {
@@ -28,7 +30,13 @@ Reached reached(const SourceHistory& history, Nanoseconds from, Nanoseconds to) 
                            [&](const Step& step) { return step.seen < from; }) -
       steps.begin());
   reached.perhaps = reached.surely;
-  while (reached.perhaps < steps.size() && steps[reached.perhaps].time <= to) ++reached.perhaps;
+  while (reached.perhaps < steps.size() && steps[reached.perhaps].time <= to) {
+    if (reached.perhaps - reached.surely == kMostSteps) {
+      reached.has_more = true;
+      break;
+    }
+    ++reached.perhaps;
+  }
   return reached;
 }
 
@@ -69,9 +77,9 @@ void Judge::look(const Run& run, Read& read, Nanoseconds from, Nanoseconds to,
   }
   const Reached range = reached(*read.history, from, to);
   read.is_unknown = !is_known(*read.history, range, to);
-  has_later = has_later || read.is_unknown;
-  for (std::size_t i = range.surely; i < range.perhaps; ++i) {
-    has_later = has_later || read.history->steps[i].time > from;
+  has_later = has_later || read.is_unknown || range.has_more;
+  for (std::size_t i = range.surely; i < range.perhaps && !has_later; ++i) {
+    has_later = read.history->steps[i].time > from;
   }
 }
 
@@ -80,7 +88,9 @@ void Judge::judge_activity(const Run& run, Read& read, Nanoseconds from, Nanosec
   read.may_be_active = read.may_be_inactive = read.is_unknown;
   if (read.is_unknown) return;
   const Reached range = reached(*read.history, from, to);
+  read.may_be_active = read.may_be_inactive = range.has_more;
   for (std::size_t i = range.surely - 1; i < range.perhaps; ++i) {
+    if (read.may_be_active && read.may_be_inactive) return;
     const ActivityWord word = word_of(*read.name, read.history->steps[i], run.start);
     read.may_be_active = read.may_be_active || shm::is_active(word, reading.first);
     read.may_be_inactive = read.may_be_inactive || !shm::is_active(word, reading.last);

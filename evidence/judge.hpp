@@ -48,6 +48,8 @@ struct Permitted {
 // Where several sources that a rule reads may each be active or not, it tries all combinations of
 // so many; of more, it permits both outcomes.
 inline constexpr std::size_t kMostUncertain = 12;
+// Where a source may have taken more steps than so many before a decision, it permits both, too.
+inline constexpr std::size_t kMostSteps = 4096;
 
 class Judge {
  public:

@@ -24,15 +24,17 @@ class Models {
   explicit Models(Compile compile) : compile_(std::move(compile)) {}
 
   // By which decisions of that generation were taken; null: its texts are not in the recording.
-  // Compiles it the first time. Throws what `compile` throws.
-  Judge* judge(const Run& run, std::uint64_t generation);
+  // Compiles it the first time, and again where many others were asked for meanwhile: a recording
+  // may have more models than memory. Throws what `compile` throws.
+  std::shared_ptr<Judge> judge(const Run& run, std::uint64_t generation);
 
  private:
   const Compile compile_;
-  std::map<const ModelChange*, std::unique_ptr<Judge>> judges_;
+  std::map<const ModelChange*, std::shared_ptr<Judge>> judges_;
 };
 
-// The table and names of a simulation, which must outlive it.
-[[nodiscard]] std::shared_ptr<const RuleTable> rule_table_of(const rules::Simulation& simulation);
+// The table and names of a simulation, which must outlive it, as it does in what `owner` keeps.
+[[nodiscard]] std::shared_ptr<const RuleTable> rule_table_of(
+    const rules::Simulation& simulation, std::shared_ptr<const void> owner = nullptr);
 
 }  // namespace arbiter::evidence

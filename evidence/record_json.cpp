@@ -21,7 +21,7 @@ class Fields {
   [[nodiscard]] bool has(const char* name) const { return object_.contains(name); }
   [[nodiscard]] std::uint64_t number(const char* name) const {
     const json& value = at(name);
-    if (!value.is_number_integer() || value < 0) fail(name, "is not a whole number of at least 0");
+    if (!value.is_number_unsigned()) fail(name, "is not a whole number of at least 0");
     return value.get<std::uint64_t>();
   }
   [[nodiscard]] Nanoseconds time(const char* name) const {

@@ -102,6 +102,8 @@ class JsonLine {
     if (byte == '"' || byte == '\\') {
       out_ += '\\';
       out_ += byte;
+    } else if (byte == '\n') {
+      out_ += "\\n";  // a model is full of them
     } else if (byte < 0x20) {
       out_ += "\\u00";
       out_ += kHex[static_cast<std::size_t>(byte) >> 4];
@@ -262,11 +264,31 @@ void RecordWriter::write(const Record& record) {
                std::span(*arrival->payload)});
 }
 
+// The rest goes on, as where the daemon does not have them.
+ModelChange RecordWriter::without_texts(const ModelChange& model) const {
+  if (say_) {
+    say_("the texts of model " + std::to_string(model.generation) +
+         " are too large for a recording: its decisions cannot be taken again");
+  }
+  ModelChange result;
+  result.time = model.time;
+  result.seen = model.seen;
+  result.generation = model.generation;
+  result.name = model.name;
+  result.how = model.how;
+  result.by = model.by;
+  return result;
+}
+
 void RecordWriter::write_record(const Record& record) {
   JsonLine line(json_);
   const Written written = std::visit([&](const auto& each) { return put(line, each); }, record);
   line.end();
   if (const auto* start = std::get_if<Start>(&record)) start_ = start->time;
+  const auto* model = std::get_if<ModelChange>(&record);
+  if (model != nullptr && model->has_texts && json_.size() > max_record_bytes(written.kind)) {
+    return write_record(without_texts(*model));
+  }
   write_json(written.kind, written.time, json_);
 }
 

@@ -22,7 +22,7 @@ struct RecordingInfo {
   // Added to a time of CLOCK_MONOTONIC gives nanoseconds since 1970. One for the whole file: where
   // the wall clock is set meanwhile, the times of the file go on evenly.
   std::int64_t wall_offset = 0;
-  // For people, a sentence each: what the file has no room for, once.
+  // For people, a sentence each: what the file has no room for.
   std::function<void(const std::string&)> say{};
 };
 
@@ -54,6 +54,7 @@ class RecordWriter {
   void write_json(RecordKind kind, Nanoseconds time, const std::string& json);
   void write_record(const Record& record);
   void leave_out_payload(const Arrival& arrival);
+  ModelChange without_texts(const ModelChange& model) const;
   std::uint16_t channel_of(const SourceContext& context);
 
   recording::McapWriter file_;

@@ -15,7 +15,7 @@ bool fits_timeout(const Run& run, const Decision& decision, Models& models) {
   const std::uint64_t before =
       decision.step == 0 ? 0 : decision.source->steps[decision.step - 1].generation;
   for (std::uint64_t generation = step.generation;; --generation) {
-    const Judge* judge = models.judge(run, generation);
+    const auto judge = models.judge(run, generation);
     if (judge == nullptr) return true;  // nobody knows
     const Nanoseconds timeout = judge->timeout(decision.context->source);
     if (step.word == shm::arrival(step.time, timeout)) return true;
@@ -52,7 +52,7 @@ class Verifier {
   explicit Verifier(Models& models) : models_(models) {}
 
   void take(const LiveDecision& live) {
-    Judge* judge = models_.judge(*live.run, live.decision->arrival().generation);
+    const auto judge = models_.judge(*live.run, live.decision->arrival().generation);
     if (judge == nullptr) {
       ++result_.without_model;
       return;

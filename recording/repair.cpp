@@ -1,6 +1,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 
 #include "recording/compression.hpp"
 #include "recording/mcap.hpp"
@@ -18,7 +19,9 @@ namespace {
 // are made from the chunks.
 class Copy {
  public:
-  explicit Copy(OutputFile& out) : out_(out) { out_.write(kMagic); }
+  Copy(std::string from, OutputFile& out) : from_(std::move(from)), out_(out) {
+    out_.write(kMagic);
+  }
 
   void add(const Record& record, std::string_view records) {
     const std::uint64_t offset = out_.bytes();
@@ -68,17 +71,27 @@ class Copy {
     }
   }
 
-  void add_chunk(const Record& record, std::string_view records) {
-    const ChunkHead head = read_chunk_head(record.content());
+  MessageIndex index_of(const Record& chunk, std::string_view records) {
     MessageIndex index;
     RecordCursor cursor(records);
-    while (const auto inner = cursor.next()) {
-      if (inner->opcode == Opcode::message) {
-        index.add(read_message(inner->content()), inner->offset);
-      } else {
-        add_declared(*inner);
+    try {
+      while (const auto inner = cursor.next()) {
+        if (inner->opcode == Opcode::message) {
+          index.add(read_message(inner->content()), inner->offset);
+        } else {
+          add_declared(*inner);
+        }
       }
+    } catch (const McapError& error) {
+      throw McapError("cannot repair " + from_ + ": at byte " + std::to_string(chunk.offset) +
+                      ", " + error.what());
     }
+    return index;
+  }
+
+  void add_chunk(const Record& record, std::string_view records) {
+    const ChunkHead head = read_chunk_head(record.content());
+    const MessageIndex index = index_of(record, records);
     McapChunk chunk;
     chunk.bytes = record.bytes;
     chunk.chunk_bytes = record.bytes.size();
@@ -93,6 +106,7 @@ class Copy {
     summary_.add_chunk(offset, chunk);
   }
 
+  const std::string from_;
   OutputFile& out_;
   Summary summary_;
 };
@@ -113,7 +127,7 @@ McapEnd repair_mcap(const std::string& from, const std::string& to, std::string_
   std::optional<Copy> copy;
   const auto on_record = [&](const Record& record, std::string_view records) {
     // All that it has is in `from` as well.
-    if (!copy) copy.emplace(out.emplace(to, Unfinished::discard));
+    if (!copy) copy.emplace(from, out.emplace(to, Unfinished::discard));
     copy->add(record, records);
   };
   McapEnd end = walk_mcap(from, max_chunk_bytes, on_record, watch);

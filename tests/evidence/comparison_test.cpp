@@ -80,5 +80,33 @@ TEST(Comparison, SaysWhereTheOtherModelDoesNotConnect) {
   EXPECT_FALSE(result.changed[0].is_connected);
 }
 
+// A file of 260 KB may have 20 000 models; kept, they took four gigabytes.
+TEST(Comparison, KeepsFewOfTheModelsOfARecording) {
+  constexpr int kModels = 100;
+  Incident incident;
+  incident.arrive("/low", 1050, 1051, Fate::accepted);
+  for (std::uint64_t generation = 2; generation <= kModels; ++generation) {
+    incident.put_in_force(generation % 2 == 0 ? kReversed : kOverride, generation,
+                          1100 + static_cast<shm::Nanoseconds>(generation));
+  }
+  incident.arrive("/high", 1300, 1301, Fate::discarded);
+  const evidence::Recorded recorded = incident.read();
+  const evidence::Run& run = recorded.runs.front();
+  int compiled = 0;
+  evidence::Models models([&](const rules::ModelTexts& texts) {
+    ++compiled;
+    return compile_texts(texts);
+  });
+  const std::weak_ptr<evidence::Judge> first = models.judge(run, 1);
+  // The last model prefers /low, which is active still.
+  const auto winners = winners_of(run, models);
+  EXPECT_TRUE(first.expired());
+  EXPECT_EQ(compiled, kModels);
+  ASSERT_EQ(winners.size(), 1u);
+  EXPECT_EQ(winners[0].winner, "/low");
+  ASSERT_NE(models.judge(run, 1), nullptr);
+  EXPECT_EQ(compiled, kModels + 1);
+}
+
 }  // namespace
 }  // namespace arbiter::test

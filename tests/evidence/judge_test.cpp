@@ -136,5 +136,21 @@ TEST(Judge, PermitsAllWhereTooManySourcesAreUncertain) {
   expect(permitted(incident, 0, model), true, true);
 }
 
+// A file may say of every arrival that it was seen at the end: half a megabyte took half a minute.
+TEST(Judge, PermitsBothWhereASourceMayHaveTakenTooManySteps) {
+  for (const bool is_too_many : {false, true}) {
+    Incident incident;
+    incident.arrive("/high", 1090, 1091, Fate::accepted, 9000);
+    incident.arrive("/low", 1100, 9000, Fate::discarded);
+    const std::size_t renewals = evidence::kMostSteps + (is_too_many ? 1 : 0);
+    for (std::size_t i = 0; i < renewals; ++i) {
+      incident.arrive("/high", 1101, 1102, Fate::accepted, 9000);
+    }
+    const Permitted found = permitted(incident, 1);
+    expect(found, is_too_many, true);
+    EXPECT_FALSE(found.rests_on_gap);
+  }
+}
+
 }  // namespace
 }  // namespace arbiter::test

@@ -4,12 +4,16 @@
 #include <gtest/gtest.h>
 
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <string>
+#include <tuple>
+#include <utility>
 #include <variant>
 #include <vector>
 
 #include "evidence/record_reader.hpp"
+#include "tests/evidence/incident.hpp"
 #include "tests/support/temporary_directory.hpp"
 
 namespace arbiter::test {
@@ -59,6 +63,70 @@ TEST(Records, LeaveOutPayloadsForWhichTheFileHasNoChannel) {
   EXPECT_TRUE(has_last);
   ASSERT_EQ(said.size(), 1u);
   EXPECT_NE(said[0].find("of /low are left out"), std::string::npos) << said[0];
+}
+
+std::vector<evidence::Record> records_in(const std::string& file) {
+  std::vector<evidence::Record> records;
+  evidence::read_recording(file, evidence::Payloads::read, [&](evidence::Record&& record) {
+    records.push_back(std::move(record));
+  });
+  return records;
+}
+
+// What a publisher or another host has told is written as it is.
+TEST(Records, HaveNumbersOfAnySize) {
+  constexpr std::uint64_t kMost = std::numeric_limits<std::uint64_t>::max();
+  Incident incident;
+  incident.arrive("/low", 1010, 1011, Incident::Fate::accepted);
+  evidence::Record record = incident.records().back();
+  auto& arrival = std::get<evidence::Arrival>(record);
+  arrival.sequence = arrival.size = arrival.generation = kMost;
+  arrival.origin = {kMost, kMost};
+  incident.add(record);
+  incident.state("/high", 1030, 1031, shm::kNeverActive, evidence::SourceState::Why::gap, kMost);
+  const auto records = records_in(incident.file());
+  ASSERT_EQ(records.size(), incident.records().size());
+  const auto& read = std::get<evidence::Arrival>(records.end()[-2]);
+  for (const std::uint64_t number :
+       {read.sequence, read.size, read.generation, read.origin.publisher, read.origin.sequence,
+        std::get<evidence::SourceState>(records.back()).lost}) {
+    EXPECT_EQ(number, kMost);
+  }
+}
+
+// A daemon takes files of 16 MiB, and JSON makes some of their bytes long.
+TEST(Records, OfModelsLackTextsThatAreTooLarge) {
+  constexpr std::size_t kBytes = 11'500'000;  // times six are more than a record has
+  std::vector<std::string> said;
+  evidence::RecordingInfo info;
+  info.say = [&](const std::string& text) { said.push_back(text); };
+  const TemporaryDirectory directory;
+  evidence::RecordWriter writer(directory.file("new.mcap"), {}, info);
+  writer.write(evidence::Start{1'000, "test", {}, "none"});
+  evidence::ModelChange model;
+  model.time = model.seen = 900;
+  model.generation = 7;
+  model.name = "calm";
+  model.how = "load";
+  model.by = "me";
+  model.has_texts = true;
+  model.files = {{"lines.xml", std::string(kBytes, '\n')}};
+  writer.write(model);
+  EXPECT_TRUE(said.empty());
+  model.files = {{"tabs.xml", std::string(kBytes, '\t')}};
+  model.application = evidence::ModelFile{"app.xml", "<application/>"};
+  writer.write(model);
+  EXPECT_EQ(said, (std::vector<std::string>{"the texts of model 7 are too large for a "
+                                            "recording: its decisions cannot be taken again"}));
+  writer.close();
+  const auto records = records_in(directory.file("new.mcap"));
+  ASSERT_EQ(records.size(), 3u);
+  EXPECT_EQ(std::get<evidence::ModelChange>(records[1]).files.at(0).text.size(), kBytes);
+  const auto& second = std::get<evidence::ModelChange>(records[2]);
+  EXPECT_FALSE(second.has_texts);
+  EXPECT_TRUE(second.files.empty() && !second.application);
+  EXPECT_EQ(std::tie(second.time, second.generation, second.name, second.how, second.by),
+            std::tie(model.time, model.generation, model.name, model.how, model.by));
 }
 
 }  // namespace

@@ -97,12 +97,16 @@ TEST_F(Repair, RefusesMoreMessagesInAChunkThanOneMayHave) {
   recording::append<std::uint32_t>(chunk, 0);
   recording::append_string(chunk, "");
   recording::append<std::uint64_t>(chunk, records.size());
+  const std::size_t chunk_at = file.size();
   recording::append_record(file, recording::Opcode::chunk, chunk + records);
+  const std::string from = directory_.write("from.mcap", file);
   try {
-    repair_mcap(directory_.write("from.mcap", file), to_, "mender");
+    repair_mcap(from, to_, "mender");
     ADD_FAILURE() << "it was repaired";
   } catch (const McapError& error) {
-    EXPECT_THAT(error.what(), HasSubstr("has more than 1048576 messages"));
+    EXPECT_THAT(error.what(),
+                HasSubstr("cannot repair " + from + ": at byte " + std::to_string(chunk_at) +
+                          ", a chunk has more than 1048576 messages"));
   }
   EXPECT_FALSE(std::filesystem::exists(to_));
 }
