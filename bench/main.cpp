@@ -32,6 +32,14 @@ struct Arguments {
 constexpr int kWrongUse = 2;
 constexpr int kInterrupted = 130;  // as a shell says it
 
+// "-": there are too few samples.
+std::string text_of(const Tail& tail, const Histogram& ns) {
+  if (!tail.is_known(ns)) return "-";
+  char text[32];
+  std::snprintf(text, sizeof text, "%.1f", ns.quantile(tail.share));
+  return text;
+}
+
 void print(const Measure& measure) {
   std::cout << "\n" << measure.title << "\n";
   for (const Case& each : measure.cases) {
@@ -42,9 +50,10 @@ void print(const Measure& measure) {
         std::snprintf(line, sizeof line, "    %-34s %14.4g %s", result.system.c_str(),
                       *result.value, (each.unit.empty() ? measure.unit : each.unit).c_str());
       } else if (result.ns.count() != 0) {
-        std::snprintf(line, sizeof line, "    %-34s p50 %9.1f  p99 %9.1f  p99.9 %9.1f  max %11.1f",
-                      result.system.c_str(), result.ns.quantile(0.5), result.ns.quantile(0.99),
-                      result.ns.quantile(0.999), result.ns.max());
+        std::snprintf(line, sizeof line, "    %-34s p50 %9.1f  p99 %9s  p99.9 %9s  max %11.1f",
+                      result.system.c_str(), result.ns.quantile(0.5),
+                      text_of(kTail99, result.ns).c_str(), text_of(kTail999, result.ns).c_str(),
+                      result.ns.max());
       } else {
         std::snprintf(line, sizeof line, "    %-34s", result.system.c_str());
       }
@@ -72,11 +81,16 @@ void print(const std::vector<Verdict>& targets) {
   }
 }
 
-// Opened first, so that an error shows before anything is measured.
-std::ofstream open(const std::string& file) {
+// Opened first, so that an error shows before anything is measured. What is there stays until there
+// is something in its place: a run may be interrupted.
+void require_writable(const std::string& file) {
+  if (!std::ofstream(file, std::ios::app)) throw std::runtime_error("cannot write " + file);
+}
+
+void write(const std::string& file, const std::string& text) {
   std::ofstream stream(file);
-  if (!stream) throw std::runtime_error("cannot write " + file);
-  return stream;
+  stream << text;
+  if (!stream.flush()) throw std::runtime_error("cannot write " + file);
 }
 
 void list() {
@@ -102,9 +116,9 @@ std::vector<MeasureEntry> chosen(const std::vector<std::string>& only) {
 }
 
 void run(const Arguments& arguments) {
-  std::ofstream json_file = open(arguments.json);
-  std::ofstream html_file = open(arguments.html);
-  std::ofstream picture_file = open(arguments.picture);
+  for (const std::string& file : {arguments.json, arguments.html, arguments.picture}) {
+    require_writable(file);
+  }
   Report report;
   report.quick = arguments.quick;
   processors();  // as they are now, before anything is pinned
@@ -131,12 +145,9 @@ void run(const Arguments& arguments) {
   print(report.targets);
   for (const std::string& warning : report.warnings) std::cout << "\nWarning: " << warning;
   const nlohmann::json json = report.json();
-  json_file << json.dump(1, ' ', false, nlohmann::json::error_handler_t::replace) << "\n";
-  html_file << html(json);
-  picture_file << picture(json);
-  if (!json_file.flush() || !html_file.flush() || !picture_file.flush()) {
-    throw std::runtime_error("cannot write the report");
-  }
+  write(arguments.json, json.dump(1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
+  write(arguments.html, html(json));
+  write(arguments.picture, picture(json));
   std::cout << "\n\nThe report is in " << arguments.json << " and " << arguments.html
             << ", its targets as a picture in " << arguments.picture << "\n";
 }

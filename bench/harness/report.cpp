@@ -33,12 +33,9 @@ nlohmann::json json_of(const Result& result) {
   json["mean"] = ns.mean();
   json["min"] = ns.min();
   json["p50"] = ns.quantile(0.5);
-  json["p90"] = ns.quantile(0.9);
-  json["p99"] = ns.quantile(0.99);
-  json["p99.9"] = ns.quantile(0.999);
-  // Of fewer samples, the tail is one sample's word.
-  if (ns.count() >= 100'000) json["p99.99"] = ns.quantile(0.9999);
-  if (ns.count() >= 1'000'000) json["p99.999"] = ns.quantile(0.99999);
+  for (const Tail& tail : kTails) {
+    if (tail.is_known(ns)) json[tail.name] = ns.quantile(tail.share);
+  }
   json["max"] = ns.max();
   json["curve"] = ns.curve();
   return json;

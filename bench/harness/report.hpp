@@ -1,6 +1,7 @@
 // What was measured, as it is written to report.json and drawn in report.html.
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
@@ -16,6 +17,22 @@ enum class Role {
   kPeer,   // what one would use instead
   kFloor,  // what the machine does without anybody's help: nothing of the kind can be faster
 };
+
+// Said only where at least ten samples lie behind it: of fewer, it is the word of one or two.
+struct Tail {
+  const char* name;
+  double share;
+  std::uint64_t least;  // samples
+
+  [[nodiscard]] bool is_known(const Histogram& ns) const { return ns.count() >= least; }
+};
+inline constexpr Tail kTail99{"p99", 0.99, 1'000};
+inline constexpr Tail kTail999{"p99.9", 0.999, 10'000};
+inline constexpr Tail kTails[] = {{"p90", 0.9, 100},
+                                  kTail99,
+                                  kTail999,
+                                  {"p99.99", 0.9999, 100'000},
+                                  {"p99.999", 0.99999, 1'000'000}};
 
 // Of one system in one case.
 struct Result {

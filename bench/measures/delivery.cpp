@@ -18,8 +18,8 @@ Measure measure_delivery(const Effort& effort) {
   Measure measure{
       "delivery", "One-way delivery",
       "Half of a round trip between two processes on two cores: publish, delivery and "
-      "take. The payload is not touched beyond its first word where the system does not "
-      "copy it."};
+      "take. A delay on one of the two ways counts half. The payload is not touched beyond its "
+      "first word where the system does not copy it."};
   measure.x_label = "bytes";
   const std::vector<std::size_t> sizes =
       effort.quick ? std::vector<std::size_t>{64, 4 << 20}

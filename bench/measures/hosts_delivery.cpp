@@ -11,6 +11,7 @@
 #include <cstring>
 #include <memory>
 #include <mutex>
+#include <string>
 #include <thread>
 
 #include "bench/harness/hosts.hpp"
@@ -110,13 +111,21 @@ class Pair {
     sender_.say(bytes);
     sender_.say(static_cast<std::uint64_t>(period));
     sender_.say(static_cast<std::uint64_t>(seconds * 1e9));
-    static_cast<void>(sender_.hear());
+    const std::uint64_t sent = sender_.hear();
     ::poll(nullptr, 0, 50);
     receiver_.say(1);
-    return receiver_.hear_histogram();
+    Histogram came = receiver_.hear_histogram();
+    sent_ += sent;
+    lost_ += sent - std::min(sent, came.count());
+    return came;
   }
   void await() {
     await_in_a_minute("a first sample", [&] { return send(kSmall, kMs, 0.02).count() != 0; });
+    sent_ = lost_ = 0;
+  }
+  // The times are of those that have come: a link throws away what is late. Empty: all have.
+  [[nodiscard]] std::string remark() const {
+    return lost_ == 0 ? "" : std::to_string(lost_) + " of " + std::to_string(sent_) + " were lost";
   }
 
  private:
@@ -124,6 +133,8 @@ class Pair {
   std::vector<Worker> between_;
   Worker sender_;
   Worker receiver_;
+  std::uint64_t sent_ = 0;
+  std::uint64_t lost_ = 0;
 };
 
 Pair through_links(const LinkedHost& from, const LinkedHost& to) {
@@ -300,16 +311,18 @@ struct Contest {
   std::shared_ptr<Pair> pair;
 };
 
-// The median of the rounds, which are interleaved.
+// The median of the rounds, which are interleaved as those of run_rounds() are.
 Case throughput(const std::vector<Contest>& all, const char* name, std::size_t bytes,
                 const Budget& budget) {
   Case result{name};
   result.unit = bytes == kSmall ? "samples/s" : "MB/s";
   std::vector<std::vector<double>> rates(all.size());
-  for (int round = 0; round < budget.rounds; ++round) {
-    for (std::size_t i = 0; i < all.size(); ++i) {
+  for (int round = 0; round <= budget.rounds; ++round) {
+    for (std::size_t n = 0; n < all.size(); ++n) {
+      const std::size_t i = (n + static_cast<std::size_t>(round)) % all.size();
       const Histogram got = all[i].pair->send(bytes, 0, budget.seconds_each);
       const double each = bytes == kSmall ? 1 : static_cast<double>(bytes) / 1e6;
+      if (round == 0) continue;  // warms up
       rates[i].push_back(static_cast<double>(got.count()) * each / budget.seconds_each);
     }
   }
@@ -350,6 +363,9 @@ void measure_pairs(Measure& measure, const Budget& budget) {
       {kWakeUp, Role::kFloor, [wake_up](double seconds) { return wake_up->round(seconds); }});
   Case small{kSmallBetweenHosts};
   small.results = run_rounds(std::move(contenders), budget);
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    if (small.results[i].note.empty()) small.results[i].note = all[i].pair->remark();
+  }
   measure.cases.push_back(std::move(small));
   measure.cases.push_back(throughput(all, kSmallThroughput, kSmall, budget));
   measure.cases.push_back(throughput(all, kLargeThroughput, kLarge, budget));

@@ -92,9 +92,15 @@ class Scene {
     static_cast<void>(view_.hear());
     await_in_a_minute("a first image", [&] { return ask(kAwaitImage) != 0; });
   }
+  // 0: no image has come.
   std::int64_t ask(Wish wish) {
     view_.say(wish);
     return static_cast<std::int64_t>(view_.hear());
+  }
+  double age_of_image() {
+    const std::int64_t age = ask(kAwaitImage);
+    if (age == 0) throw BenchError("no image has come for two seconds");
+    return static_cast<double>(age);
   }
   // On the wire, in a second.
   double bytes_a_second(double seconds) {
@@ -133,8 +139,8 @@ void measure_camera(Measure& measure, bool quick) {
   Histogram again;
   for (int i = 0; i < (quick ? 3 : 20); ++i) {
     scene.ask(kGoOn);
-    again.add(static_cast<double>(scene.ask(kAwaitImage)));
-    for (int n = 0; n < 5; ++n) always.add(static_cast<double>(scene.ask(kAwaitImage)));
+    again.add(scene.age_of_image());
+    for (int n = 0; n < 5; ++n) always.add(scene.age_of_image());
     scene.lose();
   }
   measure.cases.push_back({"1 MiB, one way",

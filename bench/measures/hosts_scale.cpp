@@ -161,7 +161,8 @@ void measure_hosts(Measure& measure, int count, double seconds) {
 
 Measure measure_hosts_scale(const Effort& effort) {
   Measure measure{"hosts-scale", "Links, by sources and by hosts",
-                  "A host with 100, 1000 and 4000 output ports, of which another imports 100; and "
+                  "A host with 100, 1000 and 4000 output ports (in a quick run 200), of which "
+                  "another imports 100 (20); and "
                   "so many hosts on this machine, each in a network namespace of its own, with ten "
                   "sources that the next host imports. Until all are imported, counted from the "
                   "start of the links; then the links' memory, processor time and traffic while "

@@ -53,7 +53,7 @@ Case measure_with(const std::string& name, const Systems& systems, int priority,
 
 Measure measure_load(const Effort& effort) {
   Measure measure{"load", "Delivery under load",
-                  std::string("64 B one way, blocking, while ") +
+                  std::string("64 B one way, blocking (half of a round trip), while ") +
                       (has_stress_ng() ? "stress-ng (cpu and cache, one of each to a processor)"
                                        : "one endless loop to each processor") +
                       " keeps all processors busy at normal priority. With SCHED_FIFO, the "

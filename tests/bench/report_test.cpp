@@ -114,18 +114,21 @@ TEST(Report, RatiosAreOfOursToAllOthers) {
 TEST(Report, RareTailsAreSaidOnlyOfManySamples) {
   Report report;
   Measure measure{"m", "M", ""};
-  for (const std::uint64_t count : {1000u, 100'000u, 1'000'000u}) {
+  for (const std::uint64_t count : {999u, 1000u, 10'000u, 100'000u, 1'000'000u}) {
     measure.cases.push_back(
         {std::to_string(count), {}, {{"arbiter", Role::kOurs, all_at(5, count), {}, {}}}});
   }
   report.measures.push_back(measure);
   const nlohmann::json json = report.json();
   const auto result = [&](std::size_t i) { return json["measures"][0]["cases"][i]["results"][0]; };
-  EXPECT_FALSE(result(0).contains("p99.99"));
-  EXPECT_TRUE(result(1).contains("p99.99"));
-  EXPECT_FALSE(result(1).contains("p99.999"));
-  EXPECT_TRUE(result(2).contains("p99.999"));
-  EXPECT_EQ(result(2)["count"], 1'000'000);
+  const std::vector<std::string> tails{"p99", "p99.9", "p99.99", "p99.999"};
+  for (std::size_t i = 0; i <= tails.size(); ++i) {
+    for (std::size_t tail = 0; tail < tails.size(); ++tail) {
+      EXPECT_EQ(result(i).contains(tails[tail]), tail < i) << tails[tail] << " of " << i;
+    }
+    EXPECT_TRUE(result(i).contains("p50"));
+  }
+  EXPECT_EQ(result(4)["count"], 1'000'000);
 }
 
 TEST(Report, ACaseMayHaveAUnitOfItsOwn) {
