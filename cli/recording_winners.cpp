@@ -1,12 +1,12 @@
 #include "cli/recording_winners.hpp"
 
 #include <algorithm>
+#include <cstddef>
 #include <iostream>
 #include <map>
 #include <memory>
 #include <optional>
 #include <set>
-#include <sstream>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -22,6 +22,7 @@
 #include "evidence/recorded.hpp"
 #include "rules/model/quantifiers.hpp"
 #include "rules/text/names.hpp"
+#include "shm/limits.hpp"
 #include "shm/utf8.hpp"
 #include "watch/process.hpp"
 
@@ -89,78 +90,152 @@ std::vector<Reign> reigns_of(const Recorded& recorded, const std::string& patter
   return all;
 }
 
+// More components of one winner are counted: a recording may tell of ever new ones.
+constexpr std::size_t kMostComponents = 8;
+
+// Who published what won.
+struct Publishers {
+  std::vector<const evidence::PortChange*> first;
+  std::size_t others = 0;
+};
+
 // A component has an output port open. It is seen a little later than it happens.
 struct Ownership {
   const evidence::PortChange* opening = nullptr;
-  shm::Nanoseconds until = shm::kForever;
-
-  [[nodiscard]] shm::Nanoseconds since() const { return opening->seen; }
+  shm::Nanoseconds since = 0;
+  shm::Nanoseconds until = shm::kForever;  // none before goes on for longer
 };
 
-std::vector<Ownership> ownerships_of(const evidence::Run& run, const std::string& source) {
-  using What = evidence::PortChange::What;
-  std::vector<Ownership> all;
-  const auto changes = run.output_changes.find(source);
-  if (changes == run.output_changes.end()) return all;
-  for (const evidence::PortChange& each : changes->second) {
-    const bool is_opening = each.what == What::open || each.what == What::opened;
-    const bool ends_last = !all.empty() && all.back().until == shm::kForever &&
-                           (is_opening || all.back().opening->pid == each.pid);
-    if (ends_last) all.back().until = each.seen;
-    // One that nobody saw open may have died all the same.
-    if (is_opening || (!ends_last && each.what == What::died)) {
-      all.push_back({&each, is_opening ? shm::kForever : each.seen});
-    }
-  }
-  return all;
-}
-
-// Who had each source open, found out once for all that it won.
-class Components {
+// Who had a source open.
+class Owners {
  public:
-  // Who published what won. A source may win after its component has gone.
-  [[nodiscard]] std::vector<const evidence::PortChange*> of(const Reign& reign);
+  Owners() = default;
+  explicit Owners(const std::vector<evidence::PortChange>& changes);
+
+  // A source may win after its component has gone.
+  [[nodiscard]] Publishers of(const Reign& reign) const;
+  // Of what was seen by then, what was recorded last; null: nothing.
+  [[nodiscard]] const evidence::PortChange* last_by(shm::Nanoseconds time) const;
 
  private:
-  std::map<std::pair<const evidence::Run*, std::string>, std::vector<Ownership>> known_;
+  const evidence::PortChange* changes_ = nullptr;
+  std::vector<shm::Nanoseconds> seen_;  // each of them, or one behind it: the earliest
+  std::vector<Ownership> all_;          // `since` and `until` do not fall
 };
 
-std::vector<const evidence::PortChange*> Components::of(const Reign& reign) {
+// One component has it open at a time. Looks come one after the other, but the deaths that one of
+// them shows come with the latest first.
+Owners::Owners(const std::vector<evidence::PortChange>& changes) : changes_(changes.data()) {
+  using What = evidence::PortChange::What;
+  std::size_t open = 0;  // behind the one that is open; 0: none is
+  shm::Nanoseconds now = 0;
+  for (const evidence::PortChange& each : changes) {
+    now = std::max(now, each.seen);
+    const bool is_opening = each.what == What::open || each.what == What::opened;
+    const bool ends_open = open != 0 && (is_opening || all_[open - 1].opening->pid == each.pid);
+    if (ends_open) {
+      all_[open - 1].until = now;
+      open = 0;
+    }
+    if (is_opening) open = all_.size() + 1;
+    // One that nobody saw open may have died all the same.
+    if (is_opening || (!ends_open && each.what == What::died)) {
+      all_.push_back({&each, now, is_opening ? shm::kForever : now});
+    }
+    seen_.push_back(each.seen);
+  }
+  for (std::size_t i = 1; i < all_.size(); ++i) {
+    all_[i].until = std::max(all_[i].until, all_[i - 1].until);
+  }
+  for (std::size_t i = seen_.size(); i-- > 1;) seen_[i - 1] = std::min(seen_[i - 1], seen_[i]);
+}
+
+Publishers Owners::of(const Reign& reign) const {
   const evidence::WinnerChange& change = reign.change;
   const bool begins_itself =
       change.why == evidence::WinnerChange::Why::arrival && change.by == change.winner;
-  const auto [known, is_new] = known_.try_emplace({reign.run, change.winner});
-  if (is_new) known->second = ownerships_of(*reign.run, change.winner);
-  const evidence::PortChange* before = nullptr;
-  std::vector<const evidence::PortChange*> found;
-  for (const Ownership& each : known->second) {
-    if (each.until <= change.time) {
-      before = each.opening;
-    } else if (each.since() < reign.end || (found.empty() && begins_itself)) {
-      if (found.empty() && each.since() > change.time && !begins_itself && before != nullptr) {
-        found.push_back(before);
-      }
-      found.push_back(each.opening);
-    }
+  const auto first_from = [&](shm::Nanoseconds Ownership::*field, shm::Nanoseconds time) {
+    const auto is_before = [&](const Ownership& one) { return one.*field < time; };
+    return static_cast<std::size_t>(std::partition_point(all_.begin(), all_.end(), is_before) -
+                                    all_.begin());
+  };
+  const std::size_t first = first_from(&Ownership::until, change.time + 1);
+  std::size_t next = first_from(&Ownership::since, change.time + 1);
+  const std::size_t end = first_from(&Ownership::since, reign.end);
+  const bool has_first = first < all_.size() && (first < end || begins_itself);
+  Publishers found;
+  if (first != 0 && (!has_first || (first >= next && !begins_itself))) {
+    found.first.push_back(all_[first - 1].opening);
   }
-  if (found.empty() && before != nullptr) found.push_back(before);
+  if (has_first) found.first.push_back(all_[first].opening);
+  for (next = std::max(next, first + 1); next < end; ++next) {
+    if (found.first.size() == kMostComponents) {
+      found.others = end - next;
+      break;
+    }
+    found.first.push_back(all_[next].opening);
+  }
   return found;
 }
 
+const evidence::PortChange* Owners::last_by(shm::Nanoseconds time) const {
+  const auto behind = std::upper_bound(seen_.begin(), seen_.end(), time) - seen_.begin();
+  return behind == 0 ? nullptr : changes_ + behind - 1;
+}
+
+// Those of each source, found out once for all that it won.
+class Components {
+ public:
+  const Owners& of(const evidence::Run& run, const std::string& source) {
+    const auto [known, is_new] = known_.try_emplace({&run, source});
+    const auto changes = run.output_changes.find(source);
+    if (is_new && changes != run.output_changes.end()) known->second = Owners(changes->second);
+    return known->second;
+  }
+  [[nodiscard]] Publishers of(const Reign& reign) {
+    return of(*reign.run, reign.change.winner).of(reign);
+  }
+  // Who had the source open that went inactive, and died; null: nobody did.
+  [[nodiscard]] const evidence::PortChange* death_behind(const Reign& reign) {
+    const evidence::WinnerChange& change = reign.change;
+    if (change.why != evidence::WinnerChange::Why::expiry) return nullptr;
+    const evidence::PortChange* last = of(*reign.run, change.by).last_by(change.time);
+    const bool has_died = last != nullptr && last->what == evidence::PortChange::What::died;
+    return has_died ? last : nullptr;
+  }
+
+ private:
+  std::map<std::pair<const evidence::Run*, std::string>, Owners> known_;
+};
+
+// No component and no host has a longer one, and it is told wherever its source wins.
+void cut_names(Recorded& recorded) {
+  for (evidence::Run& run : recorded.runs) {
+    for (auto& [source, changes] : run.output_changes) {
+      for (evidence::PortChange& each : changes) {
+        for (std::string* name : {&each.node, &each.host}) {
+          name->resize(shm::beginning_of(*name, shm::kMaxNameLength).size());
+        }
+      }
+    }
+  }
+}
+
 // " of nav (pid 4711)", " from host base"; empty: not known.
-std::string components_text(const std::vector<const evidence::PortChange*>& components) {
+std::string components_text(const Publishers& publishers) {
   std::string text;
-  for (const evidence::PortChange* each : components) {
+  for (const evidence::PortChange* each : publishers.first) {
     const std::string one = shm::printable(each->host.empty() ? "of " + watch::process_text(*each)
                                                               : "from host " + each->host);
     text += (text.empty() ? " " : ", then ") + one;
   }
+  if (publishers.others != 0) text += ", and " + rules::counted(publishers.others, "other");
   return text;
 }
 
-ordered_json components_json(const std::vector<const evidence::PortChange*>& components) {
+ordered_json components_json(const Publishers& publishers) {
   ordered_json list = ordered_json::array();
-  for (const evidence::PortChange* each : components) {
+  for (const evidence::PortChange* each : publishers.first) {
     list.push_back({{"node", each->node},
                     {"pid", each->pid},
                     {"host", each->host.empty() ? ordered_json() : ordered_json(each->host)}});
@@ -168,31 +243,13 @@ ordered_json components_json(const std::vector<const evidence::PortChange*>& com
   return list;
 }
 
-// Who had the source open that went inactive, and died; null: nobody did.
-const evidence::PortChange* death_behind(const Reign& reign) {
-  const evidence::WinnerChange& change = reign.change;
-  const auto changes = reign.run->output_changes.find(change.by);
-  if (change.why != evidence::WinnerChange::Why::expiry ||
-      changes == reign.run->output_changes.end()) {
-    return nullptr;
-  }
-  const evidence::PortChange* last = nullptr;
-  for (const evidence::PortChange& each : changes->second) {
-    if (each.seen <= change.time) last = &each;
-  }
-  const bool has_died = last != nullptr && last->what == evidence::PortChange::What::died;
-  return has_died ? last : nullptr;
-}
-
-std::string death_text(const Reign& reign) {
-  const evidence::PortChange* death = death_behind(reign);
+std::string death_text(const Reign& reign, const evidence::PortChange* death) {
   if (death == nullptr) return "";
   return "; " + shm::printable(watch::process_text(*death)) + " had died " +
          seconds_text(reign.change.time - death->seen) + " before";
 }
 
-ordered_json death_json(const Reign& reign) {
-  const evidence::PortChange* death = death_behind(reign);
+ordered_json death_json(const evidence::PortChange* death) {
   if (death == nullptr) return nullptr;
   return {{"node", death->node}, {"pid", death->pid}, {"at_ns", death->seen}};
 }
@@ -248,8 +305,50 @@ void warn_of_pattern_without_match(const Recorded& recorded, const std::string& 
                       "output port: name an input port that it is connected to"});
 }
 
+// One by one: each may be much longer than what was recorded of it.
+void write_reigns_json(const std::vector<Reign>& reigns, shm::Nanoseconds offset) {
+  Components components;
+  const char* before = "[\n  ";
+  for (const Reign& reign : reigns) {
+    const evidence::WinnerChange& change = reign.change;
+    const Publishers publishers = components.of(reign);
+    ordered_json one{
+        {"from", clock_text(change.time + offset)},
+        {"from_ns", change.time},
+        {"to_ns", reign.end},
+        {"cut_off", reign.is_cut_off},
+        {"port", change.port},
+        {"winner", change.winner.empty() ? ordered_json() : ordered_json(change.winner)},
+        {"components", components_json(publishers)},
+        {"why", evidence::name_of(change.why)},
+        {"by", change.by},
+        {"died", death_json(components.death_behind(reign))},
+        {"generation", change.generation}};
+    if (publishers.others != 0) one["other_components"] = publishers.others;
+    std::string text = one.dump(2, ' ', false, ordered_json::error_handler_t::replace);
+    for (auto end = text.find('\n'); end != std::string::npos; end = text.find('\n', end + 1)) {
+      text.insert(end + 1, "  ");
+    }
+    std::cout << before << text;
+    before = ",\n  ";
+  }
+  std::cout << (reigns.empty() ? "[]\n" : "\n]\n");
+}
+
+void write_reigns(const std::vector<Reign>& reigns, shm::Nanoseconds offset) {
+  Components components;
+  for (const Reign& reign : reigns) {
+    const evidence::WinnerChange& change = reign.change;
+    std::cout << clock_text(change.time + offset) << "  " << shm::printable(change.port) << "  "
+              << (change.winner.empty() ? "idle" : shm::printable(change.winner))
+              << components_text(components.of(reign)) << "  " << length_text(reign) << ": "
+              << cause_text(change) << death_text(reign, components.death_behind(reign)) << '\n';
+  }
+}
+
 int show_winners(const RecordedWinners& options) {
-  const Recorded recorded = load_for_simulation(options.file);
+  Recorded recorded = load_for_simulation(options.file);
+  cut_names(recorded);
   warn_of_missed(recorded);
   if (!options.port.empty()) warn_of_pattern_without_match(recorded, options.port);
   std::vector<Reign> reigns = reigns_of(recorded, options.port);
@@ -261,37 +360,12 @@ int show_winners(const RecordedWinners& options) {
     });
   }
   const shm::Nanoseconds offset = recorded.about.wall_offset;
-  Components components;
   if (options.json) {
-    ordered_json list = ordered_json::array();
-    for (const Reign& reign : reigns) {
-      const evidence::WinnerChange& change = reign.change;
-      list.push_back(
-          {{"from", clock_text(change.time + offset)},
-           {"from_ns", change.time},
-           {"to_ns", reign.end},
-           {"cut_off", reign.is_cut_off},
-           {"port", change.port},
-           {"winner", change.winner.empty() ? ordered_json() : ordered_json(change.winner)},
-           {"components", components_json(components.of(reign))},
-           {"why", evidence::name_of(change.why)},
-           {"by", change.by},
-           {"died", death_json(reign)},
-           {"generation", change.generation}});
-    }
-    std::cout << list.dump(2, ' ', false, ordered_json::error_handler_t::replace) << '\n';
-    return 0;
+    write_reigns_json(reigns, offset);
+  } else {
+    write_reigns(reigns, offset);
+    if (reigns.empty()) std::cout << nobody_text(options);
   }
-  std::ostringstream out;
-  for (const Reign& reign : reigns) {
-    const evidence::WinnerChange& change = reign.change;
-    out << clock_text(change.time + offset) << "  " << shm::printable(change.port) << "  "
-        << (change.winner.empty() ? "idle" : shm::printable(change.winner))
-        << components_text(components.of(reign)) << "  " << length_text(reign) << ": "
-        << cause_text(change) << death_text(reign) << '\n';
-  }
-  if (reigns.empty()) out << nobody_text(options);
-  std::cout << out.str();
   return 0;
 }
 

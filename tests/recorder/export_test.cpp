@@ -205,6 +205,37 @@ TEST(RecordedWinners, SaysWhoseTheWinnerWas) {
               testing::EndsWith(": /low went inactive; nav (pid 11) had died 2.000 s before\n"));
 }
 
+// Each opens the port where another one is said to have died, whom nobody saw open it.
+TEST(RecordedWinners, CountsComponentsOfWhichThereAreTooMany) {
+  using Why = evidence::WinnerChange::Why;
+  using What = evidence::PortChange::What;
+  constexpr int kMany = 100;
+  Incident incident(kOverride, {"/low"});
+  incident.add(evidence::WinnerChange{"/all", "/low", "/other", 1000, Why::arrival, "/low", 1});
+  for (int i = 0; i < kMany; ++i) {
+    const shm::Nanoseconds time = 2000 + 10 * i;
+    const std::string node = "nav" + std::string(5000, 'x');
+    incident.add(evidence::PortChange{What::opened, false, "/low", node, 10 + i, "", time});
+    incident.add(evidence::PortChange{What::died, false, "/low", "nav", 7, "", time + 1});
+    incident.add(evidence::WinnerChange{"/p", "/low", "", time + 2, Why::arrival, "/low", 1});
+    incident.add(evidence::WinnerChange{"/p", "", "/low", time + 4, Why::expiry, "/low", 1});
+  }
+  const std::string file = incident.file(2000 + 10 * kMany);
+  const auto out = arbiter({"recording", "winners", file}).out;
+  EXPECT_LT(out.size(), kMany * 1000u) << "each names the one that had the port open then";
+  EXPECT_THAT(out, testing::ContainsRegex("/all  /low of nav.*, and 192 others  for "));
+  EXPECT_THAT(out, testing::HasSubstr("xx (pid 109)  for 0.000 s: /low arrived\n"));
+  EXPECT_THAT(out, testing::HasSubstr("; nav (pid 7) had died 0.000 s before\n"));
+  const auto found = nlohmann::json::parse(arbiter({"recording", "winners", "--json", file}).out);
+  EXPECT_THAT(found[0]["components"], testing::SizeIs(8));
+  EXPECT_EQ(found[0]["other_components"], 192);
+  EXPECT_THAT(found.back()["components"], testing::SizeIs(0));
+  const auto& last = found[found.size() - 2];
+  EXPECT_THAT(last["components"], testing::SizeIs(1));
+  EXPECT_EQ(last["components"][0]["pid"], 109);
+  EXPECT_FALSE(last.contains("other_components"));
+}
+
 TEST(RecordedWinners, SaysThatNobodyHasWon) {
   Incident incident;
   EXPECT_EQ(arbiter({"recording", "winners", incident.file()}).out,

@@ -42,13 +42,14 @@ class RawPublisher {
     writer_->write(state);
     client_.send(answer, {shm::reopen(events_.descriptor, O_RDONLY).get(), -1});
   }
-  // A signal that came at that time, by the list of that revision.
-  void signal_at(shm::Nanoseconds time, std::uint64_t revision = 0) {
+  // A signal that came at that time, by the list of that revision and a model.
+  void signal_at(shm::Nanoseconds time, std::uint64_t revision = 0, std::uint64_t generation = 0) {
     shm::EventRecord record;
     record.kind = shm::EventKind::kSignal;
     record.time = time;
     record.activity = shm::kForeverFlag | time;
     record.revision = revision;
+    record.generation = generation;
     record.masks.accepted = 1;
     write(record);
   }
