@@ -54,6 +54,9 @@ WhyAnswer::WhyAnswer(const WhyOptions& options, const watch::Port& port, Look lo
                             },
                             [this](shm::SourceId source) {
                               return look_.sources.state(port_.source_name(source)).arrived_by();
+                            },
+                            [this](shm::SourceId source) {
+                              return look_.sources.state(port_.source_name(source)).began;
                             }})),
       shown_(explanation_.connections) {
   const auto is_other = [&](const auto& each) { return each.source != options_.source; };

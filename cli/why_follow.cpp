@@ -129,7 +129,8 @@ class Follower {
     if (is_new_model) {
       because = model.text() + " came into force" + how_text(model);
     }
-    if (!causes.empty() && !is_new_model) because = events_text(port_, causes, look);
+    if (!causes.empty() && !is_new_model)
+      because = events_text(port_, causes, look, look.sources.now());
     const std::string old = name_of(last_);
     std::string loser;
     for (const auto& each : explanation->connections) {
@@ -171,12 +172,12 @@ class Follower {
 }  // namespace
 
 std::string events_text(const watch::Port& port, const std::vector<shm::SourceId>& sources,
-                        const Look& look) {
+                        const Look& look, shm::Nanoseconds at) {
   std::string text;
   for (const shm::SourceId source : sources) {
     const std::string& name = port.source_name(source);
     if (!text.empty()) text += " and ";
-    text += event_text(name, look.sources.state(name), look.sources.now());
+    text += event_text(name, look.sources.state(name), at);
   }
   return text;
 }

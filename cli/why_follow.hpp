@@ -24,8 +24,8 @@ struct WhyOptions {
 // Returns the exit code. Throws as watch::Port does.
 int follow_winners(const WhyOptions& options);
 
-// What happened to these sources last: "/a became active and /b was deactivated".
+// What happened to these sources last, up to that time: "/a became active and /b was deactivated".
 std::string events_text(const watch::Port& port, const std::vector<shm::SourceId>& sources,
-                        const watch::Look& look);
+                        const watch::Look& look, shm::Nanoseconds at);
 
 }  // namespace arbiter::cli

@@ -70,7 +70,7 @@ std::string WhyAnswer::since_text() const {
   const ModelInForce& model = port_.model();
   if (tenure_.is_exact()) {
     return ", for " + span_text(now - tenure_.at_least) + ", since " +
-           events_text(port_, tenure_.changed, look_);
+           events_text(port_, tenure_.changed, look_, *tenure_.not_before);
   }
   const shm::Nanoseconds decided_since = model.since(port_.name());
   if (tenure_.at_least != 0 && tenure_.at_least == decided_since) {
@@ -85,7 +85,7 @@ std::string WhyAnswer::since_text() const {
   if (tenure_.not_before) {
     text += text.empty() ? ", for " : " and ";
     text += "at most " + span_text(now - *tenure_.not_before) + " (not before " +
-            events_text(port_, tenure_.changed, look_) + ')';
+            events_text(port_, tenure_.changed, look_, *tenure_.not_before) + ')';
   } else if (tenure_.at_least == 0) {
     text += ": nothing has ever happened here";
   }
@@ -96,7 +96,7 @@ json WhyAnswer::since_json() const {
   json changed = json::array();
   for (const shm::SourceId source : tenure_.changed) {
     const std::string name = port_.source_name(source);
-    changed.push_back(event_json(name, look_.sources.state(name), look_.sources.now()));
+    changed.push_back(event_json(name, look_.sources.state(name), *tenure_.not_before));
   }
   return {{"exact", tenure_.is_exact()},
           {"at_least_ns", tenure_.at_least},

@@ -46,7 +46,8 @@ nlohmann::json connection_json(const rules::ConnectionExplanation& connection,
 
 // "/Face/pos:o arrived", "/Object/pos:o went inactive, 500 ms after its last arrival".
 std::string event_text(const std::string& source, const SourceState& state, shm::Nanoseconds now);
-// "active", "expired", "deactivated", and when it became so; of a beginning, when it last arrived.
+// "active", "expired", "deactivated", and when it became so; of a beginning that is not known, when
+// it last arrived.
 nlohmann::json event_json(const std::string& source, const SourceState& state,
                           shm::Nanoseconds now);
 

@@ -68,14 +68,18 @@ class Loader {
   void add(Arrival&& each) {
     SourceHistory& history = add_step(*each.context, {each.time, each.seen, each.word,
                                                       Step::Kind::arrival, false, each.generation});
+    history.word = each.word;
     const auto step = static_cast<std::uint32_t>(history.steps.size() - 1);
     run().decisions.push_back(
         {&history, step, std::move(each.context), each.sequence, each.is_sample, each.masks});
   }
 
   void add(Deactivation&& each) {
-    add_step(*each.context, {each.time, each.seen, shm::deactivation(each.time),
-                             Step::Kind::deactivation, false, each.generation});
+    SourceHistory& history =
+        add_step(*each.context, {each.time, each.seen, shm::deactivation(each.time),
+                                 Step::Kind::deactivation, false, each.generation});
+    history.word = history.steps.size() == 1 ? shm::deactivation(each.time)
+                                             : shm::deactivated(history.word, each.time);
   }
 
   // Where a state says what was known already, nothing has happened in between: a value stands for
@@ -84,7 +88,7 @@ class Loader {
     SourceHistory& history = run().sources[each.context->source];
     run().lost += each.lost;
     run().end = std::max(run().end, each.seen);
-    const bool is_known = !history.steps.empty() && history.steps.back().word == each.word;
+    const bool is_known = !history.steps.empty() && history.word == each.word;
     // It is tapped now; the step below stands behind the gap.
     if (each.why != SourceState::Why::page) history.unknown_from = shm::kForever;
     if (is_known && each.lost == 0) return;
@@ -106,7 +110,7 @@ class Loader {
         step.time = std::clamp(deactivated, step.time, each.seen);
       }
     }
-    add_step(*each.context, step);
+    add_step(*each.context, step).word = each.word;
   }
 
   void add(ModelChange&& each) {

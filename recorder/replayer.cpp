@@ -130,7 +130,7 @@ void Replayer::survey(const Record& record) {
     latest_ = std::max(latest_, arrival->time);
   } else if (const auto* over = std::get_if<evidence::Deactivation>(&record)) {
     source.has_events = true;
-    source.word = shm::deactivation(over->time);
+    source.word = shm::deactivated(source.word, over->time);
     latest_ = std::max(latest_, over->time);
   } else if (const auto* state = std::get_if<evidence::SourceState>(&record)) {
     survey(*state, source);

@@ -165,8 +165,10 @@ void Ring::sum_up(const Record& record) {
     note(state_of(arrival->context, arrival->time, arrival->seen, arrival->sequence,
                   arrival->generation, arrival->word));
   } else if (const auto* over = std::get_if<evidence::Deactivation>(&record)) {
+    const auto known = sources_.find(over->context->source);
     note(state_of(over->context, over->time, over->seen, over->sequence, over->generation,
-                  shm::deactivation(over->time)));
+                  known == sources_.end() ? shm::deactivation(over->time)
+                                          : shm::deactivated(known->second.word, over->time)));
   } else if (const auto* state = std::get_if<SourceState>(&record)) {
     if (state->why != SourceState::Why::page) {  // its publisher tells of it now
       for (const auto why : {Missed::Why::refused, Missed::Why::stranger}) {

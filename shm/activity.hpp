@@ -6,7 +6,7 @@
 //   word                    meaning                                  active at `now`
 //   0 .. 2^62-1             activity ends at this time (arrival + T)  word > now
 //   2^62 | arrival          active until deactivated (T = forever)    always
-//   negative, 2^63 | time   deactivated at this time                  never
+//   negative, 2^63 | time   deactivated at this time, while active    never
 //
 // Invariants
 //  1. One writer: the component that has the source's output port open, or its successor; the
@@ -43,6 +43,11 @@ constexpr ActivityWord deactivation(Nanoseconds at) noexcept { return kDeactivat
 
 constexpr bool is_active(ActivityWord word, Nanoseconds now) noexcept { return word > now; }
 
+// What a deactivation makes of a word: what is not active stays as it is.
+constexpr ActivityWord deactivated(ActivityWord word, Nanoseconds at) noexcept {
+  return is_active(word, at) ? deactivation(at) : word;
+}
+
 // True where the passing of time alone can change what the word says.
 constexpr bool is_finite(ActivityWord word) noexcept { return word >= 0 && word < kForeverFlag; }
 
@@ -74,17 +79,34 @@ constexpr Nanoseconds time_of(ActivityWord word, Nanoseconds timeout) noexcept {
   return word == kNeverActive ? -1 : arrival_of(word, timeout);
 }
 
+// Since when a source is active, or was until the end or the deactivation that its word tells, by
+// `began`; below 0: that is not known. What began later is not taken for its beginning.
+constexpr Nanoseconds beginning_of(ActivityWord word, Nanoseconds began, Nanoseconds now) noexcept {
+  constexpr Nanoseconds kUnknown = -1;
+  if (word == kNeverActive || began <= 0 || began > now) return kUnknown;
+  if (word >= kForeverFlag) return began <= (word & ~kForeverFlag) ? began : kUnknown;
+  return began < (word & ~kDeactivatedFlag) ? began : kUnknown;
+}
+
 struct Activity {
   Atomic<ActivityWord> word{kNeverActive};
   Atomic<std::uint64_t> breaks{0};  // how often an arrival has found the source inactive
+  // The time of the last arrival that has; 0: not known. For people: no decision reads it.
+  Atomic<Nanoseconds> began{0};
 
-  // By the one writer; what the word must come before, a fence of its orders. `begins`: it is an
-  // arrival that finds the source inactive.
+  // By the one writer, at `now`; what the word must come before, a fence of its orders. `begins`:
+  // it is an arrival that finds the source inactive.
   // SYNC POINT: activity-written. The release, and the order of the two stores, pair with the
   // acquires in SeenActivity::of(): who sees the word sees the break before it, and the model that
-  // was in force for its writer.
-  void write(ActivityWord next, bool begins) noexcept {
-    if (begins) breaks.store(breaks.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
+  // was in force for its writer. Who sees the word sees that beginning, or a later one.
+  void write(ActivityWord next, bool begins, Nanoseconds now) noexcept {
+    if (begins) {
+      breaks.store(breaks.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
+      // Just before it the source was inactive, but where the last activity ended at this very
+      // time.
+      const Nanoseconds end = word.load(std::memory_order_relaxed) & ~kDeactivatedFlag;
+      began.store(end < now ? now : 0, std::memory_order_relaxed);
+    }
     word.store(next, std::memory_order_release);
   }
 
@@ -92,6 +114,7 @@ struct Activity {
   // what he writes after this counts no more.
   void carry_on(const Activity& before) noexcept {
     breaks.store(before.breaks.load(std::memory_order_relaxed), std::memory_order_relaxed);
+    began.store(before.began.load(std::memory_order_relaxed), std::memory_order_relaxed);
     word.store(before.word.load(std::memory_order_relaxed), std::memory_order_relaxed);
   }
 };

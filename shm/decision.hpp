@@ -91,7 +91,7 @@ template <class IsActive>
 }
 
 // In place of a connection's own source, where its rule is to take that as active.
-inline const Activity always_active{{kForeverFlag}, {0}};
+inline const Activity always_active{{kForeverFlag}, {0}, {0}};
 
 // A source that a rule reads, and how it was last seen.
 struct Read {

@@ -28,6 +28,10 @@ bool try_once(const shm::DecisionMemory& memory, const SourcesOf& sources_of, Pi
     const bool is_seen = each.activity != nullptr;
     picture.words[each.source] = is_seen ? each.seen.word : shm::kNeverActive;
     if (!is_seen) picture.unseen.push_back(each.source);
+    if (!is_seen) continue;
+    const auto began = shm::beginning_of(
+        each.seen.word, each.activity->began.load(std::memory_order_relaxed), picture.now);
+    if (began >= 0) picture.began[each.source] = began;
   }
   return memory.tables().is_in_force(picture.snapshot) && picture.is_settled;
 }

@@ -19,6 +19,8 @@ struct Picture {
   shm::Nanoseconds now = 0;     // CLOCK_MONOTONIC: the moment that it is of
   // Of each source that was asked for; kNeverActive of one that has no page here yet.
   std::map<shm::SourceId, shm::ActivityWord> words;
+  // Since when these are active, or were until their ends, where that is known.
+  std::map<shm::SourceId, shm::Nanoseconds> began;
   std::vector<shm::SourceId> unseen;  // these, ascending
   bool is_settled = true;  // else sources changed too fast for one picture: it mixes moments
 

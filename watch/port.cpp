@@ -76,8 +76,10 @@ void Port::read_table(Look& look) const {
   look.winner = look.picture.winner_at(id_);
   look.sources.set_time(look.picture.now);
   for (const auto& [source, word] : look.picture.words) {
-    look.sources.set(source_name(source),
-                     {word, look.table().timeout(source), !look.picture.is_unseen(source)});
+    SourceState state{word, look.table().timeout(source), !look.picture.is_unseen(source)};
+    const auto began = look.picture.began.find(source);
+    if (began != look.picture.began.end()) state.began = began->second;
+    look.sources.set(source_name(source), state);
   }
 }
 

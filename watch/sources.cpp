@@ -21,7 +21,9 @@ std::optional<shm::Nanoseconds> SourceState::arrived_by() const {
 
 shm::Nanoseconds event_time(const SourceState& state, shm::Nanoseconds now) {
   if (shm::is_deactivation(state.word)) return state.word & ~shm::kDeactivatedFlag;
-  if (shm::is_active(state.word, now)) return state.last_arrival().value_or(now);
+  if (shm::is_active(state.word, now)) {
+    return state.began ? *state.began : state.last_arrival().value_or(now);
+  }
   return state.word;
 }
 

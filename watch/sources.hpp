@@ -19,6 +19,8 @@ struct SourceState {
   std::optional<shm::Nanoseconds> timeout_before{};
   shm::Nanoseconds timeout_changed = 0;
   shm::ActivityWord word_at_change = shm::kNeverActive;
+  // When its activity began, though it may be over.
+  std::optional<shm::Nanoseconds> began{};
   // How long after this arrival, when T had passed, the next one came, if somebody waited for it.
   std::optional<shm::Nanoseconds> gap{};
 
@@ -28,8 +30,8 @@ struct SourceState {
   [[nodiscard]] std::optional<shm::Nanoseconds> arrived_by() const;
 };
 
-// When what happened to a source last did happen, as its word tells: its deactivation, its last
-// arrival while it is active, its end.
+// When what happened to a source last did happen: its deactivation; while it is active, its
+// beginning, or where that is not known, its last arrival; its end.
 [[nodiscard]] shm::Nanoseconds event_time(const SourceState& state, shm::Nanoseconds now);
 
 class Sources {

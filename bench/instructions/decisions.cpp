@@ -65,7 +65,7 @@ class Table {
     ++changes_;
     changed.write(was_active ? shm::deactivation(kNow - 1 - changes_)
                              : shm::arrival(kNow - 1 - changes_, kHour),
-                  !was_active);
+                  !was_active, kNow - 1 - changes_);
     return decide();
   }
 

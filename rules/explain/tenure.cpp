@@ -63,12 +63,21 @@ struct Past {
   std::vector<Span> spans;
   Activation before = Activation::kUnknown;  // further back
 
-  // `arrived_by`: as in Moment.
+  // `arrived_by`, `began`: as in Moment.
   static Past of(shm::ActivityWord word, shm::Nanoseconds timeout,
-                 std::optional<shm::Nanoseconds> arrived_by, shm::Nanoseconds now) {
+                 std::optional<shm::Nanoseconds> arrived_by, std::optional<shm::Nanoseconds> began,
+                 shm::Nanoseconds now) {
     if (word == shm::kNeverActive) return {{}, Activation::kInactive};
+    const shm::Nanoseconds end = word & ~shm::kDeactivatedFlag;
+    if (began) {
+      Past past{{{*began, Activation::kActive}, {*began - 1, Activation::kInactive}}};
+      if (!shm::is_active(word, now)) {
+        past.spans.insert(past.spans.begin(), {end, Activation::kInactive});
+      }
+      return past;
+    }
     if (shm::is_deactivation(word)) {
-      return {{{word & ~shm::kDeactivatedFlag, Activation::kInactive}}};
+      return {{{end, Activation::kInactive}, {end - 1, Activation::kActive}}};
     }
     // T may have been another at the arrival. But it arrived before now, and was active after it.
     const shm::Nanoseconds arrived = std::min(arrived_by.value_or(shm::arrival_of(word, timeout)),
@@ -142,7 +151,9 @@ Tenure tenure_of(const shm::TableView& table, shm::PortId port, shm::SourceId wi
   std::map<shm::Nanoseconds, std::vector<shm::SourceId>, std::greater<>> changes;
   for (const shm::SourceId source : sources_heeded(table, port)) {
     const auto arrived_by = moment.arrived_by ? moment.arrived_by(source) : std::nullopt;
-    const Past past = Past::of(moment.word(source), table.timeout(source), arrived_by, moment.now);
+    const auto began = moment.began ? moment.began(source) : std::nullopt;
+    const Past past =
+        Past::of(moment.word(source), table.timeout(source), arrived_by, began, moment.now);
     for (const auto& span : past.spans) changes[span.since].push_back(source);
     pasts.emplace(source, past);
   }

@@ -1,12 +1,12 @@
 // Since when a port's winner wins, as far as what the sources' activity words say of the past goes.
 //
-// A word tells the last thing that happened to its source, not when its activity began: to note
-// that would cost every publish(). So the past is known in pieces:
+// A word tells the last thing that happened to its source, and beside it stands when its activity
+// began, where its publisher has noted that. So the past is known in pieces:
 //
-//   expired       inactive since the end, which the word is; active for T before; further back
-//                 nothing is known
-//   active        since its last arrival at the latest; it may have been renewed by that
-//   deactivated   since then at the latest; it may have been inactive before
+//   expired       inactive since the end, which the word is; active before, since it began, or for
+//                 T; inactive just before it began; further back nothing is known
+//   active        since it began, and inactive just before; or since its last arrival at the latest
+//   deactivated   inactive since then, and active just before, since it began
 //   never active  always inactive
 //
 // Going back from one such moment to the one before, the rules are evaluated with what is not known
@@ -53,6 +53,8 @@ struct Moment {
   // Of a source whose last arrival came under another T than that of the table: when it was at the
   // latest. Empty: there are none.
   std::function<std::optional<shm::Nanoseconds>(shm::SourceId)> arrived_by{};
+  // When the activity of a source began of which its word tells. Empty: of none that is known.
+  std::function<std::optional<shm::Nanoseconds>(shm::SourceId)> began{};
 };
 
 Tenure tenure_of(const shm::TableView& table, shm::PortId port, shm::SourceId winner,

@@ -63,7 +63,7 @@ TEST(Why, TellsWhichConditionIsFalseAndWhatMakesItSo) {
 
 TEST(Why, TellsHowSomethingCameToBeInactive) {
   Daemon daemon(
-      R"(<behaviors timeout="1ms"><arbiter at="/in">
+      R"(<behaviors timeout="1ms"><source port="/ended" timeout="forever"/><arbiter at="/in">
 <select from="/never"/><select from="/over">not /never</select>
 <select from="/ended">not /never and not /over</select></arbiter></behaviors>)");
   Node node("test");
@@ -90,11 +90,19 @@ TEST(Why, TellsSinceWhenWhereItCanBeKnown) {
   random.signal();
   face.signal();
   const json before = why_json({"/gaze"})["since"];
-  EXPECT_EQ(before["not_before_ns"], nullptr) << "/face may have been active before";
+  EXPECT_EQ(before["exact"], true);
+  EXPECT_EQ(before["changed"][0]["became"], "active");
+  face.signal();
+  EXPECT_EQ(why_json({"/gaze"})["since"], before) << "it went on without a gap";
+  EXPECT_THAT(why({"/gaze"}), HasSubstr(", since /face became active"));
   face.deactivate();
   const json since = why_json({"/gaze"})["since"];
+  EXPECT_EQ(since["exact"], true);
   EXPECT_GT(since["at_least_ns"], before["at_least_ns"]);
-  EXPECT_THAT(why({"/gaze"}), HasSubstr("/random wins, for at least "));
+  EXPECT_EQ(since["changed"][0]["became"], "deactivated");
+  face.deactivate();
+  EXPECT_EQ(why_json({"/gaze"})["since"], since) << "it was over";
+  EXPECT_THAT(why({"/gaze"}), HasSubstr(", since /face was deactivated"));
 }
 
 TEST(Why, TellsThatSomethingWentInactiveAndMadeTheWinner) {

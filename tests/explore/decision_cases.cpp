@@ -32,13 +32,13 @@ struct World {
   void stamp_fence() { shm::full_fence(); }  // (a)
   void arrive(SourceId id, shm::Nanoseconds timeout = shm::kForever) {
     const shm::ActivityWord next = shm::arrival(++time, timeout);
-    activities[id].write(next, !shm::is_active(own[id], time));
+    activities[id].write(next, !shm::is_active(own[id], time), time);
     own[id] = next;
     stamp_fence();
   }
   void deactivate(SourceId id) {
     const shm::ActivityWord next = shm::deactivation(++time);
-    activities[id].write(next, false);
+    activities[id].write(next, false, time);
     own[id] = next;
     stamp_fence();
   }

@@ -250,7 +250,7 @@ TEST_F(Decision, ASourceThatChangesAtEveryLookLeavesItUnsettledAfterABoundedTime
   ScriptedClock clock{0, true, 0, 0, [] {}};
   clock.on_read = [&] {  // always one step behind an activity that is deactivated in between
     time += 1000;
-    activities_[kC].write(arrival(time + 10, kShortT), true);
+    activities_[kC].write(arrival(time + 10, kShortT), true, time + 10);
     clock.next = time;
   };
   clock.on_read();
@@ -301,9 +301,9 @@ TEST_F(KeptBound, ItDecidesAsOneThatIsBoundAnewWhateverHappensInBetween) {
           Activity& activity = activities_[draw(kFour)];
           const Nanoseconds timeout = draw(5) == 0 ? kForever : kShortT;
           if (draw(3) == 0) {
-            activity.write(deactivation(now), false);
+            activity.write(deactivation(now), false, now);
           } else {
-            activity.write(arrival(now, timeout), !is_active(activity.word, now));
+            activity.write(arrival(now, timeout), !is_active(activity.word, now), now);
           }
           now += 1 + draw(5);
         }

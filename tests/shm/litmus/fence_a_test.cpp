@@ -93,8 +93,8 @@ int publish_and_look(Race& race, int self) {
   const Nanoseconds enough = monotonic_now() + kEnough;
   int round = 1;
   for (; begin_together(race, self, round, enough); ++round) {
-    own.activity.write(arrival(round, kForever), false);  // as publish() stamps
-    full_fence();                                         // (a)
+    own.activity.write(arrival(round, kForever), false, round);  // as publish() stamps
+    full_fence();                                                // (a)
     const ActivityWord seen = other.activity.word.load(std::memory_order_acquire);
     race.saw_other[static_cast<std::size_t>(self)][static_cast<std::size_t>(round - 1)] =
         seen == arrival(round, kForever);
