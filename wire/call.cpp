@@ -140,7 +140,9 @@ std::string nobody_answers(const Caller& caller, const std::string& why_not) {
   return "no arbiterd of instance \"" + caller.instance + "\" answered within " +
          std::to_string(caller.patience.count()) + " ms" +
          (why_not.empty() ? "" : " (" + why_not + ")") +
-         "; components that run go on by its last model; start one with: arbiterd --model FILE --instance " + caller.instance;
+         "; components that run go on by its last model; start one with: arbiterd --model FILE "
+         "--instance " +
+         caller.instance;
 }
 
 std::string no_descriptor_left(std::string_view what_for) {
