@@ -115,9 +115,10 @@ int replay(const ReplayVerb& verb) {
               << rules::enumerate({changed.begin(), changed.end()}) << " became signals\n";
   }
   if (replayed.samples != 0 && replayed.delivered == 0) {
-    std::cout << (replayed.discarded == 0
-                      ? "none was delivered: no input port that they are connected to is open"
-                      : "none was delivered: others won at each input port")
+    std::cout << "none was delivered: "
+              << (replayed.refused != 0     ? "input ports refused them; arbiter status says why"
+                  : replayed.discarded != 0 ? "others won at each input port"
+                                            : "no input port that they are connected to is open")
               << '\n';
   }
   return replayed.was_interrupted ? interrupted_exit_code(interrupts) : 0;

@@ -99,6 +99,11 @@ std::string ended_text(const SourceState& source, shm::Nanoseconds now) {
   return "inactive (for " + span_text(now - source.word) + "; " + past_timeout_text(source);
 }
 
+// At its beginning, whatever has become of it since.
+bool becomes_active(const SourceState& state, shm::Nanoseconds now) {
+  return state.began == now || shm::is_active(state.word, now);
+}
+
 }  // namespace
 
 std::string activity_text(const Sources& sources, const std::string& name) {
@@ -262,17 +267,17 @@ json connection_json(const rules::ConnectionExplanation& connection, const Sourc
 }
 
 std::string event_text(const std::string& source, const SourceState& state, shm::Nanoseconds now) {
+  if (becomes_active(state, now)) return source + " became active";
   if (shm::is_deactivation(state.word)) return source + " was deactivated";
-  if (shm::is_active(state.word, now)) return source + " became active";
   const auto arrival = state.last_arrival();
   if (!arrival) return source + " went inactive";
   return source + " went inactive, " + span_text(state.word - *arrival) + " after its last arrival";
 }
 
 json event_json(const std::string& source, const SourceState& state, shm::Nanoseconds now) {
-  const char* what = shm::is_deactivation(state.word)  ? "deactivated"
-                     : shm::is_active(state.word, now) ? "active"
-                                                       : "expired";
+  const char* what = becomes_active(state, now)         ? "active"
+                     : shm::is_deactivation(state.word) ? "deactivated"
+                                                        : "expired";
   return {{"source", source}, {"became", what}, {"at_ns", event_time(state, now)}};
 }
 

@@ -27,7 +27,7 @@ struct Step {
 
 struct SourceHistory {
   std::vector<Step> steps;  // in the source's order
-  // What its page says after them: a deactivation of what is not active is a step, and leaves it.
+  // What its page says after them: to deactivate once more is a step, and leaves it.
   shm::ActivityWord word = shm::kNeverActive;
   // From then on it could not be tapped, and still cannot.
   Nanoseconds unknown_from = shm::kForever;

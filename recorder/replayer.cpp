@@ -328,6 +328,7 @@ void Replayer::arrive(Source& source, const Arrival& arrival, Nanoseconds at, Re
   const Outcome outcome = keeps_times_ ? port.publish_at(time_at(at), bytes) : port.publish(bytes);
   replayed.delivered += outcome.delivered;
   replayed.discarded += outcome.discarded;
+  replayed.refused += outcome.refused;
 }
 
 }  // namespace arbiter::recorder

@@ -38,6 +38,7 @@ struct Replayed {
   std::uint64_t deactivations = 0;
   std::uint64_t delivered = 0;        // samples, for each input port that got one
   std::uint64_t discarded = 0;        // and for each at which another won
+  std::uint64_t refused = 0;          // or that refused it
   std::uint64_t without_payload = 0;  // samples that became signals
   std::uint64_t of_another_type = 0;  // than the source's last sample, and so the port: the same
   std::set<std::string> changed{};    // the sources of these

@@ -6,7 +6,7 @@
 //   word                    meaning                                  active at `now`
 //   0 .. 2^62-1             activity ends at this time (arrival + T)  word > now
 //   2^62 | arrival          active until deactivated (T = forever)    always
-//   negative, 2^63 | time   deactivated at this time, while active    never
+//   negative, 2^63 | time   deactivated at this time                  never
 //
 // Invariants
 //  1. One writer: the component that has the source's output port open, or its successor; the
@@ -43,11 +43,6 @@ constexpr ActivityWord deactivation(Nanoseconds at) noexcept { return kDeactivat
 
 constexpr bool is_active(ActivityWord word, Nanoseconds now) noexcept { return word > now; }
 
-// What a deactivation makes of a word: what is not active stays as it is.
-constexpr ActivityWord deactivated(ActivityWord word, Nanoseconds at) noexcept {
-  return is_active(word, at) ? deactivation(at) : word;
-}
-
 // True where the passing of time alone can change what the word says.
 constexpr bool is_finite(ActivityWord word) noexcept { return word >= 0 && word < kForeverFlag; }
 
@@ -65,6 +60,11 @@ constexpr bool ends_within(ActivityWord word, Nanoseconds timeout, Nanoseconds n
 }
 
 constexpr bool is_deactivation(ActivityWord word) noexcept { return word < 0; }
+
+// What a deactivation makes of a word: once more changes nothing.
+constexpr ActivityWord deactivated(ActivityWord word, Nanoseconds at) noexcept {
+  return is_deactivation(word) ? word : deactivation(at);
+}
 
 // The arrival that wrote a word that is not a deactivation, given the source's T.
 constexpr Nanoseconds arrival_of(ActivityWord word, Nanoseconds timeout) noexcept {
@@ -91,7 +91,8 @@ constexpr Nanoseconds beginning_of(ActivityWord word, Nanoseconds began, Nanosec
 struct Activity {
   Atomic<ActivityWord> word{kNeverActive};
   Atomic<std::uint64_t> breaks{0};  // how often an arrival has found the source inactive
-  // The time of the last arrival that has; 0: not known. For people: no decision reads it.
+  // The time of the last arrival that has; 0: not known, or what it began was over when the source
+  // was deactivated. For people: no decision reads it.
   Atomic<Nanoseconds> began{0};
 
   // By the one writer, at `now`; what the word must come before, a fence of its orders. `begins`:
@@ -109,6 +110,10 @@ struct Activity {
     }
     word.store(next, std::memory_order_release);
   }
+
+  // By the one writer: before the end that the next word tells, the source may have been inactive;
+  // or the time of its last arrival was somebody's choice.
+  void forget_beginning() noexcept { began.store(0, std::memory_order_relaxed); }
 
   // By the daemon, into a page that nobody reads yet, from one whose owner is gone, or should be:
   // what he writes after this counts no more.

@@ -20,6 +20,7 @@ std::optional<shm::Nanoseconds> SourceState::arrived_by() const {
 }
 
 shm::Nanoseconds event_time(const SourceState& state, shm::Nanoseconds now) {
+  if (state.began == now) return now;
   if (shm::is_deactivation(state.word)) return state.word & ~shm::kDeactivatedFlag;
   if (shm::is_active(state.word, now)) {
     return state.began ? *state.began : state.last_arrival().value_or(now);

@@ -36,7 +36,7 @@
 
 namespace arbiter::wire {
 
-inline constexpr std::uint32_t kWireVersion = 5;
+inline constexpr std::uint32_t kWireVersion = 6;
 
 enum class MessageKind : std::uint32_t {
   // From a client.

@@ -116,20 +116,27 @@ Counts publish_at(OutputCore& core, Time at, std::uint32_t slot, std::size_t siz
   LoanedBy loan(&core, {slot});  // given back where this is refused
   begin_replay(core, at);
   static_cast<void>(loan.release());
-  return core.publish_loan(slot, size, nanoseconds(at));
+  const Counts counts = core.publish_loan(slot, size, nanoseconds(at));
+  core.end_replay();
+  return counts;
 }
 Counts publish_copy_at(OutputCore& core, Time at, const void* data, std::size_t size) {
   begin_replay(core, at);
-  return core.publish_copy(data, size, nanoseconds(at));
+  const Counts counts = core.publish_copy(data, size, nanoseconds(at));
+  core.end_replay();
+  return counts;
 }
 Counts signal_at(OutputCore& core, Time at) {
   begin_replay(core, at);
-  return core.signal(nanoseconds(at));
+  const Counts counts = core.signal(nanoseconds(at));
+  core.end_replay();
+  return counts;
 }
 void require_replay(const OutputCore& core) { core.require_replay(); }
 void deactivate_at(OutputCore& core, Time at) {
   begin_replay(core, at);
   core.deactivate(nanoseconds(at));
+  core.end_replay();
 }
 void describe(OutputCore& core, std::string_view text, bool is_trouble) noexcept {
   if (is_own(core)) core.node->describe(core.instance(), text, is_trouble);

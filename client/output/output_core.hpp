@@ -113,6 +113,8 @@ class OutputCore {
   // For replay: the next call of those above may be given the time `at`, as if it had read the
   // clock then and had been held up until `now`. Throws Error.
   void begin_replay(shm::Nanoseconds at, shm::Nanoseconds now);
+  // Behind it: nobody saw anything begin at that time.
+  void end_replay() noexcept { activity_->forget_beginning(); }
   // Throws Error where the policy does not allow replay.
   void require_replay() const;
 

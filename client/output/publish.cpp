@@ -387,10 +387,11 @@ void OutputCore::deactivate(shm::Nanoseconds now) noexcept {
   if (handover_.has_offer()) accept_view();
   if (!rules_are_bound()) bind_rules();
   const bool ends = shm::is_active(own_word_, now);
-  // What is not active stays as it is: that it ran out, or was deactivated, and when. A replay may
-  // be at a time when it was.
-  const shm::ActivityWord word = activity_->word.load(std::memory_order_relaxed);
-  if (shm::is_active(word, now)) stamp(shm::deactivation(now), false, now);
+  // Once more changes nothing: since when it is so stays known.
+  if (!shm::is_deactivation(own_word_)) {
+    if (!ends) activity_->forget_beginning();  // what had begun ended before
+    stamp(shm::deactivation(now), false, now);
+  }
   last_ = now;
   if (teller_.is_on()) tell_deactivation();
   if (ends) ring_where_selection_changed();

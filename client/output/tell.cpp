@@ -67,7 +67,6 @@ void OutputCore::tell_arrival(std::uint32_t slot) noexcept {
 void OutputCore::tell_deactivation() noexcept {
   shm::EventRecord record = state();
   record.kind = shm::EventKind::kDeactivation;
-  if (!shm::is_deactivation(own_word_)) record.activity = shm::deactivation(last_);  // it was over
   teller_.tell(record);
 }
 

@@ -57,6 +57,8 @@ class Middleware {
   // Every tend_period(), and at Bell::ring(): to look after what is out there, to count peers.
   // Throws NeedsNewProcess.
   virtual void tend() {}
+  // Nothing can be sent yet, since what takes long to join is being joined.
+  [[nodiscard]] virtual bool is_joining() const { return false; }
   // A middleware that rings for what happens need not be asked often.
   [[nodiscard]] virtual shm::Nanoseconds tend_period() const { return 100'000'000; }
 };

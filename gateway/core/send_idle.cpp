@@ -1,5 +1,6 @@
 #include "gateway/core/send_idle.hpp"
 
+#include <algorithm>
 #include <chrono>
 #include <list>
 #include <string>
@@ -14,6 +15,8 @@ namespace arbiter::gateway {
 namespace {
 
 constexpr auto kAgain = std::chrono::milliseconds(25);
+// For a domain to be joined, which may wait for a name server.
+constexpr shm::Nanoseconds kMostPatience = 30'000'000'000;
 
 struct Part {
   explicit Part(const Entry& of) : entry(of), account(of.outside(), "subscriber") {}
@@ -58,11 +61,15 @@ bool send_idle(const std::vector<Mapping>& mappings, Kind kind, Middleware& midd
   }
   if (parts.empty()) return true;
   middleware.start({}, {});
-  const shm::Nanoseconds end = shm::monotonic_now() + time;
+  const shm::Nanoseconds begun = shm::monotonic_now();
+  shm::Nanoseconds end = begun + time;
   do {
     middleware.tend();
     for (Part& part : parts) send(part);
     std::this_thread::sleep_for(kAgain);
+    if (middleware.is_joining()) {
+      end = std::min(shm::monotonic_now(), begun + kMostPatience) + time;
+    }
   } while (shm::monotonic_now() < end);
   bool is_sent = true;
   for (const Part& part : parts) is_sent = tell(part) && is_sent;

@@ -1,5 +1,6 @@
 #include "gateway/dds/dds_middleware.hpp"
 
+#include <algorithm>
 #include <chrono>
 #include <system_error>
 #include <utility>
@@ -163,10 +164,16 @@ void DdsMiddleware::stop() noexcept {
   for (OutTopic& out : outs_) out.tell_nobody();
 }
 
+bool DdsMiddleware::is_joining() const {
+  return std::any_of(sites_.begin(), sites_.end(),
+                     [](const auto& each) { return each.second.joining.valid(); });
+}
+
 void DdsMiddleware::tend() {
   if (!started_) return;
   const std::uint64_t stops = guard_.stops();
-  const bool was_stopped = std::exchange(stops_, stops) != stops;
+  // To subscribe again, a participant is made, for which Cyclone waits while it joins a domain.
+  const bool was_stopped = !is_joining() && std::exchange(stops_, stops) != stops;
   for (auto& [id, site] : sites_) {
     if (!site.domain && !open(site)) continue;
     try {
@@ -219,7 +226,7 @@ bool DdsMiddleware::has_joined(Site& site) {
   auto patience = std::chrono::milliseconds(0);
   const shm::Nanoseconds now = shm::monotonic_now();
   if (!site.joining.valid()) {
-    if (now < site.open_again) return false;
+    if (now < site.open_again || is_joining()) return false;
     site.open_again = now + kLongToJoin;
     low_descriptors_.let_go();
     try {

@@ -35,6 +35,7 @@ class DdsMiddleware : public Middleware {
   void start(const std::vector<OpenIn>& ins, const std::vector<OpenOut>& outs) override;
   void stop() noexcept override;
   void tend() override;
+  [[nodiscard]] bool is_joining() const override;
   // The bell rings for whoever comes and goes. What is left is how things stand.
   [[nodiscard]] shm::Nanoseconds tend_period() const override { return 500'000'000; }
 
@@ -60,7 +61,8 @@ class DdsMiddleware : public Middleware {
   void say_domains() const;
   // Says it, and so does each account.
   static void set_problem(Site& site, const std::string& problem);
-  // False: not yet. Throws DdsError.
+  // False: not yet, or another one is being joined, for which Cyclone would let this one wait.
+  // Throws DdsError.
   bool has_joined(Site& site);
   // False: not now, and each account says why.
   bool open(Site& site);

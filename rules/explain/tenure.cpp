@@ -76,9 +76,7 @@ struct Past {
       }
       return past;
     }
-    if (shm::is_deactivation(word)) {
-      return {{{end, Activation::kInactive}, {end - 1, Activation::kActive}}};
-    }
+    if (shm::is_deactivation(word)) return {{{end, Activation::kInactive}}};
     // T may have been another at the arrival. But it arrived before now, and was active after it.
     const shm::Nanoseconds arrived = std::min(arrived_by.value_or(shm::arrival_of(word, timeout)),
                                               std::min<shm::Nanoseconds>(now, word - 1));

@@ -34,7 +34,11 @@ class Past {
     const bool was_active = shm::is_active(simulation_.activity(id), at);
     shm::Activity& activity = activities_[id];
     static_cast<void>(simulation_.step(event));
-    activity.write(simulation_.activity(id), kind == rules::TraceKind::kArrival && !was_active, at);
+    const bool is_arrival = kind == rules::TraceKind::kArrival;
+    if (!is_arrival && !was_active && !shm::is_deactivation(activity.word.load())) {
+      activity.forget_beginning();
+    }
+    activity.write(simulation_.activity(id), is_arrival && !was_active, at);
     winners_[static_cast<std::size_t>(at)] = winner();  // after all that happens at this time
   }
   void arrives(Nanoseconds at, const std::string& source) {
