@@ -105,6 +105,28 @@ TEST(Why, TellsSinceWhenWhereItCanBeKnown) {
   EXPECT_THAT(why({"/gaze"}), HasSubstr(", since /face was deactivated"));
 }
 
+// What it was that happened then, not what has become of the source since.
+TEST(Why, TellsOfABeginningWhoseActivityIsOver) {
+  Daemon daemon(R"(<behaviors timeout="forever"><arbiter at="/in">
+<select from="/wanted">not /fault or /override</select></arbiter></behaviors>)");
+  Node node("test");
+  auto wanted = node.output_port<int>("/wanted");
+  auto fault = node.output_port<int>("/fault");
+  auto override_ = node.output_port<int>("/override");
+  wanted.signal();
+  fault.signal();
+  override_.signal();
+  fault.deactivate();
+  override_.deactivate();
+  const json since = why_json({"/in"})["since"];
+  EXPECT_EQ(since["exact"], true);
+  ASSERT_EQ(since["changed"].size(), 1u);
+  EXPECT_EQ(since["changed"][0]["source"], "/override");
+  EXPECT_EQ(since["changed"][0]["became"], "active");
+  EXPECT_EQ(since["changed"][0]["at_ns"], since["at_least_ns"]);
+  EXPECT_THAT(why({"/in"}), HasSubstr(", since /override became active"));
+}
+
 TEST(Why, TellsThatSomethingWentInactiveAndMadeTheWinner) {
   Daemon daemon(R"(<behaviors timeout="forever"><source port="/high" timeout="1ms"/>
 <arbiter at="/in"><select from="/low">not /high</select><select from="/high"/></arbiter>

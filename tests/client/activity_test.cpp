@@ -1,6 +1,10 @@
 // Activity of sources, live: it follows arrivals alone, and belongs to the source.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <optional>
+#include <vector>
+
 #include <arbiter/arbiter.hpp>
 
 #include "tests/client/component.hpp"
@@ -112,6 +116,28 @@ TEST(Activity, DeactivatingOnceMoreKeepsTheTimeOfTheFirst) {
   EXPECT_LT(first->time(), again->time());
   EXPECT_EQ(first->stands_since(), first->time());
   EXPECT_EQ(again->stands_since(), first->time());
+}
+
+// As a component that ends in good order does, whatever its T was.
+TEST(Activity, WhoDeactivatesWhatIsOverAndClosesHasLostNoEvent) {
+  Daemon daemon(override_model("1ns"));
+  Node node("test");
+  std::optional<OutputPort<Number>> high(node.output_port<Number>("/high"));
+  Node other("watcher");
+  auto tap = other.tap("/high");
+  wait_until_watched(*high, tap);
+  high->signal();
+  high->deactivate();
+  high->deactivate();
+  high.reset();
+  std::vector<TapEventKind> kinds;
+  while (kinds.empty() || kinds.back() != TapEventKind::closed) {
+    const auto event = next_of(tap);
+    EXPECT_EQ(event->lost(), 0u);
+    kinds.push_back(event->kind());
+    if (kinds.back() == TapEventKind::closed) EXPECT_TRUE(event->is_deactivated());
+  }
+  EXPECT_EQ(std::count(kinds.begin(), kinds.end(), TapEventKind::deactivation), 2);
 }
 
 TEST(Activity, EndsByItselfAfterItsTime) {

@@ -96,8 +96,8 @@ class OutputPortBase {
   Outcome signal(Time deadline, Origin origin) noexcept {
     return detail::signal(*core_, deadline, origin);
   }
-  // Ends the source's activity at once. Never too late. Where it has ended already, this is an
-  // event for taps, and changes nothing else. Wait-free.
+  // Ends the source's activity at once. Never too late. Once more, it is an event for taps, and
+  // changes nothing else. Wait-free.
   void deactivate() noexcept { detail::deactivate(*core_); }
 
   // Whether anybody could use a sample. False: at the last arrival, a sample or a signal, the
