@@ -132,7 +132,8 @@ TEST(Activity, WhoDeactivatesWhatIsOverAndClosesHasLostNoEvent) {
   high.reset();
   std::vector<TapEventKind> kinds;
   while (kinds.empty() || kinds.back() != TapEventKind::closed) {
-    const auto event = next_of(tap);
+    const auto event = tap.wait_for(kForever);
+    if (!event) continue;
     EXPECT_EQ(event->lost(), 0u);
     kinds.push_back(event->kind());
     if (kinds.back() == TapEventKind::closed) EXPECT_TRUE(event->is_deactivated());
