@@ -54,7 +54,7 @@ class RecordWriter {
   void write_json(RecordKind kind, Nanoseconds time, const std::string& json);
   void write_record(const Record& record);
   void leave_out_payload(const Arrival& arrival);
-  ModelChange without_texts(const ModelChange& model) const;
+  [[nodiscard]] ModelChange without_texts(const ModelChange& model) const;
   std::uint16_t channel_of(const SourceContext& context);
 
   recording::McapWriter file_;
