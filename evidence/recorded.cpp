@@ -78,8 +78,7 @@ class Loader {
     SourceHistory& history =
         add_step(*each.context, {each.time, each.seen, shm::deactivation(each.time),
                                  Step::Kind::deactivation, false, each.generation});
-    history.word = history.steps.size() == 1 ? shm::deactivation(each.time)
-                                             : shm::deactivated(history.word, each.time);
+    history.word = shm::deactivated(history.word, each.time);
   }
 
   // Where a state says what was known already, nothing has happened in between: a value stands for

@@ -6,9 +6,8 @@
 //   expired       inactive since the end, which the word is; active before, since it began, or for
 //                 T; inactive just before it began; further back nothing is known
 //   active        since it began, and inactive just before; or since its last arrival at the latest
-//   deactivated   inactive since then at the latest; where its beginning is known, it was active
-//   just
-//                 before, since then
+//   deactivated   inactive since then at the latest; active just before, since it began, where that
+//                 is known
 //   never active  always inactive
 //
 // Going back from one such moment to the one before, the rules are evaluated with what is not known
