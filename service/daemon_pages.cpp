@@ -63,7 +63,7 @@ bool Daemon::end_activity(const Source& source) {
   const shm::ActivityWord before = activity.word.load(std::memory_order_relaxed);
   // What is not active stays as it is: that it ran out, and when, or that it has never arrived.
   if (!shm::is_active(before, now)) return false;
-  activity.write(shm::deactivation(now), false, now);
+  activity.deactivate(now);
   // SYNC POINT: stamped. Fence (a), as of a publisher's own deactivate().
   shm::full_fence();
   switchboard_.ring_concerned(board_.in_force().table, source.id);

@@ -111,8 +111,16 @@ struct Activity {
     word.store(next, std::memory_order_release);
   }
 
-  // By the one writer: before the end that the next word tells, the source may have been inactive;
-  // or the time of its last arrival was somebody's choice.
+  // By the one writer, whose source is deactivated at `now`. Once more changes nothing: since when
+  // it is so stays known. Where the source was not active, what had begun ended before.
+  void deactivate(Nanoseconds now) noexcept {
+    const ActivityWord before = word.load(std::memory_order_relaxed);
+    if (is_deactivation(before)) return;
+    if (!is_active(before, now)) forget_beginning();
+    write(deactivation(now), false, now);
+  }
+
+  // By the one writer: the time of the last arrival was somebody's choice.
   void forget_beginning() noexcept { began.store(0, std::memory_order_relaxed); }
 
   // By the daemon, into a page that nobody reads yet, from one whose owner is gone, or should be:

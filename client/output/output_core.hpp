@@ -201,7 +201,7 @@ class OutputCore {
   inline bool begin_arrival(shm::Nanoseconds now) noexcept;
   // With the sample in `slot`, or without one (kNoSlot).
   Counts arrive(std::uint32_t slot, std::size_t size, shm::Nanoseconds now) noexcept;
-  void stamp(shm::ActivityWord word, bool begins, shm::Nanoseconds now) noexcept;
+  void stamped(shm::ActivityWord word) noexcept;  // what the page says now
   void decide_all(shm::Nanoseconds now) noexcept;
   void decide_anew(shm::Nanoseconds now) noexcept;
   void decide_by(shm::DecisionClock clock) noexcept;

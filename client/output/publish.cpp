@@ -70,8 +70,7 @@ void OutputCore::end_loan(std::uint32_t slot) noexcept {
 // before publish() returns. It pairs with fence (a) of other publishers (of two that override each
 // other, at least one sees the other), with fence (d) of a receiver about to wait, and gives the
 // guarantee that no take() which begins after publish() has returned misses the stamp.
-void OutputCore::stamp(shm::ActivityWord word, bool begins, shm::Nanoseconds now) noexcept {
-  activity_->write(word, begins, now);
+void OutputCore::stamped(shm::ActivityWord word) noexcept {
   own_word_ = word;
   shm::full_fence();
 }
@@ -80,7 +79,9 @@ void OutputCore::stamp(shm::ActivityWord word, bool begins, shm::Nanoseconds now
   if (handover_.has_offer()) accept_view();
   if (!is_settled()) settle();
   const bool begins = !shm::is_active(own_word_, now);
-  stamp(shm::arrival(now, timeout_), begins, now);
+  const shm::ActivityWord word = shm::arrival(now, timeout_);
+  activity_->write(word, begins, now);
+  stamped(word);
   last_ = now;
   return begins;
 }
@@ -387,11 +388,8 @@ void OutputCore::deactivate(shm::Nanoseconds now) noexcept {
   if (handover_.has_offer()) accept_view();
   if (!rules_are_bound()) bind_rules();
   const bool ends = shm::is_active(own_word_, now);
-  // Once more changes nothing: since when it is so stays known.
-  if (!shm::is_deactivation(own_word_)) {
-    if (!ends) activity_->forget_beginning();  // what had begun ended before
-    stamp(shm::deactivation(now), false, now);
-  }
+  activity_->deactivate(now);
+  stamped(activity_->word.load(std::memory_order_relaxed));
   last_ = now;
   if (teller_.is_on()) tell_deactivation();
   if (ends) ring_where_selection_changed();

@@ -72,8 +72,7 @@ void Simulation::apply(const TraceEvent& event) {
   const shm::SourceId source = ids_.at(event.source);
   shm::Activity& activity = activity_[source];
   if (event.kind == TraceKind::kDeactivation) {
-    const shm::ActivityWord before = activity.word.load(std::memory_order_relaxed);
-    activity.write(shm::deactivated(before, event.at), false, event.at);
+    activity.deactivate(event.at);
   } else {
     activity.write(shm::arrival(event.at, table_.timeout(source)), !is_active(source), event.at);
   }

@@ -28,7 +28,7 @@ struct World {
     }
   }
 
-  // As OutputCore::stamp(), for each source by its one publisher.
+  // As OutputCore::stamped(), for each source by its one publisher.
   void stamp_fence() { shm::full_fence(); }  // (a)
   void arrive(SourceId id, shm::Nanoseconds timeout = shm::kForever) {
     const shm::ActivityWord next = shm::arrival(++time, timeout);

@@ -35,10 +35,11 @@ class Past {
     shm::Activity& activity = activities_[id];
     static_cast<void>(simulation_.step(event));
     const bool is_arrival = kind == rules::TraceKind::kArrival;
-    if (!is_arrival && !was_active && !shm::is_deactivation(activity.word.load())) {
-      activity.forget_beginning();
+    if (is_arrival) {
+      activity.write(simulation_.activity(id), !was_active, at);
+    } else {
+      activity.deactivate(at);
     }
-    activity.write(simulation_.activity(id), is_arrival && !was_active, at);
     winners_[static_cast<std::size_t>(at)] = winner();  // after all that happens at this time
   }
   void arrives(Nanoseconds at, const std::string& source) {
