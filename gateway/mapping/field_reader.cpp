@@ -5,15 +5,28 @@
 namespace arbiter::gateway {
 namespace {
 
+// Of a common type of ROS 2 that has no field to choose by.
+bool has_no_field(Attributes& attributes, const SampleShape& shape, const Choice& choice) {
+  const bool is_empty = shape.type == "std_msgs/msg/Empty";
+  const bool is_boolean = choice.field == Field::kBoolean;
+  // Behind its strings a number has a place of which only the user knows.
+  const bool is_unplaced = has_strings(shape.type) && (is_boolean || !attributes.has("offset"));
+  if (!is_empty && !is_unplaced) return false;
+  attributes.error(
+      "invalid-value", "type",
+      "a " + shape.type +
+          (is_empty     ? " says nothing, so that nothing in it can choose"
+           : is_boolean ? " has no Boolean field that could choose"
+                        : " begins with a string or a header, which cannot choose") +
+          " between two sources; write port=\"…\" in place of the two, or " +
+          (is_empty || is_boolean ? "map a topic of another type"
+                                  : "say with offset=\"…\" where the number is in each sample"));
+  return true;
+}
+
 // The common types of ROS 2 have fields of one kind each.
 bool check_kind(Attributes& attributes, const SampleShape& shape, const Choice& choice) {
-  if (shape.is_dds && shape.type == "std_msgs/msg/Empty") {
-    attributes.error("invalid-value", "type",
-                     "a " + shape.type +
-                         " says nothing, so that nothing in it can choose between two sources; "
-                         "write port=\"…\" in place of the two, or map a topic of another type");
-    return false;
-  }
+  if (shape.is_dds && has_no_field(attributes, shape, choice)) return false;
   const bool is_boolean = choice.field == Field::kBoolean;
   if (is_boolean && (attributes.has("above") || attributes.has("below"))) {
     return false;  // the field was refused

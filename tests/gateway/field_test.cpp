@@ -75,6 +75,13 @@ TEST(Mapping, AFieldIsOneThatASampleHas) {
   EXPECT_THAT(
       read_dds("<in topic='/a' type='std_msgs/msg/Empty' true='/a:o' false='/b:o'/>").message(),
       HasSubstr("write port=\"…\" in place of the two, or map a topic of another type"));
+  EXPECT_THAT(read_dds("<in topic='/a' type='std_msgs/msg/String' false='/b:o'/>").message(),
+              HasSubstr("a std_msgs/msg/String has no Boolean field that could choose"));
+  EXPECT_THAT(read("geometry_msgs/msg/TwistStamped", "threshold='1' field='f64'").message(),
+              HasSubstr("say with offset=\"…\" where the number is in each sample"));
+  EXPECT_THAT(
+      read("geometry_msgs/msg/TwistStamped", "threshold='1' field='f64' offset='24'").findings(),
+      IsEmpty());
   EXPECT_THAT(read("std_msgs/msg/Bool", "threshold='1' field='u8'").message(),
               HasSubstr("are Boolean, not u8; write true=\"…\" and false=\"…\""));
   EXPECT_THAT(read_dds("<in topic='/a' type='geometry_msgs/msg/Twist' true='/a:o' false='/b:o'/>")
