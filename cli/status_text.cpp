@@ -67,8 +67,8 @@ void print_model(std::ostream& out, const wire::Status& status) {
   const wire::ModelStatus& model = status.model;
   out << "instance " << status.instance << ", pid " << status.pid << ", model " << model.generation;
   if (status.models.size() > 1) out << ' ' << model.name.value_or("-");
-  for (const auto& file : model.files) out << ' ' << file;
-  if (model.application) out << ", application " << *model.application;
+  for (const auto& file : model.files) out << ' ' << shm::printable(file);
+  if (model.application) out << ", application " << shm::printable(*model.application);
   out << '\n';
   if (model.refused) {
     out << "  the files of --model were refused, so it keeps the model of the last daemon; mend "

@@ -42,8 +42,10 @@ int list(const SwitchOptions& options) {
   }
   for (const auto& model : models) {
     std::cout << (model.in_force ? "* " : "  ") << model.name;
-    for (const auto& file : model.files) std::cout << ' ' << file;
-    if (model.application) std::cout << ", application " << *model.application;
+    for (const auto& file : model.files) std::cout << ' ' << shm::printable(file);
+    if (model.application) {
+      std::cout << ", application " << shm::printable(*model.application);
+    }
     if (model.in_force && !model.as_loaded) {
       std::cout << "  (after a rollback, an older one is in force)";
     }

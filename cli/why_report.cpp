@@ -7,6 +7,7 @@
 
 #include "rules/text/duration.hpp"
 #include "rules/text/names.hpp"
+#include "shm/utf8.hpp"
 
 namespace arbiter::cli {
 namespace {
@@ -16,7 +17,9 @@ using nlohmann::json;
 constexpr std::size_t kMaxNamed = 4;
 
 std::string place(const rules::Location& where) {
-  return where.file.empty() ? "" : " (" + where.file + ":" + std::to_string(where.line) + ")";
+  return where.file.empty()
+             ? ""
+             : " (" + shm::printable(where.file) + ":" + std::to_string(where.line) + ")";
 }
 
 json place_json(const rules::Location& where) {

@@ -48,6 +48,12 @@ TEST(Report, WritesAsCompilersDoAndCounts) {
             "2 errors, 1 note\n");
 }
 
+TEST(Report, PrintsNoControlCharacterOfAFilesName) {
+  Diagnostics diagnostics;
+  diagnostics.error("some-error", {"m\x1b[2J.xml", 9, 1}, "bad");
+  EXPECT_EQ(printed(diagnostics), "m\\x1b[2J.xml:9:1: error: bad [some-error]\n1 error\n");
+}
+
 TEST(Report, CallsNoWitnessAShortestThatIsNotKnownToBe) {
   Diagnostics diagnostics;
   diagnostics.error("both-can-win", {"m.xml", 1, 1}, "both win", {},
