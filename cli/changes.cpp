@@ -5,6 +5,7 @@
 #include <set>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include <nlohmann/json.hpp>
 
@@ -31,6 +32,21 @@ void write_in_force(const wire::ChangeReport& report) {
     std::cout << "the policy " << report.policy->file << " is in force, "
               << rules::counted(report.policy->rules, "rule") << '\n';
   }
+}
+
+// Ports that somebody has open, and that get nothing by this model.
+void write_unmentioned(const std::string& verb, const std::string& instance) {
+  std::vector<std::string> names;
+  try {
+    for (const wire::InputStatus& port : fetch_status(verb, instance).inputs) {
+      if (port.open && !port.mentioned) names.push_back(port.name);
+    }
+  } catch (const wire::CallError&) {
+    return;  // who may change the model need not be allowed to observe
+  }
+  if (names.empty()) return;
+  std::cout << "  open, but not mentioned by this model, so that no sample arrives: "
+            << rules::enumerate(names) << '\n';
 }
 
 void add_files(const wire::LoadedModelStatus& model, std::set<std::string>& files) {
@@ -108,8 +124,12 @@ wire::ChangeReport ask_for_change(const std::string& verb, const std::string& in
   return report;
 }
 
-int write_result(const wire::ChangeReport& report, bool json) {
-  if (report.ok && !json) write_in_force(report);
+int write_result(const wire::ChangeReport& report, const std::string& verb,
+                 const std::string& instance, bool json) {
+  if (report.ok && !json) {
+    write_in_force(report);
+    if (report.generation.value_or(0) != 0) write_unmentioned(verb, instance);
+  }
   return report.ok ? 0 : 1;
 }
 

@@ -14,7 +14,9 @@ namespace arbiter::cli {
 wire::ChangeReport ask_for_change(const std::string& verb, const std::string& instance,
                                   wire::Message question, bool json);
 
-// Unless `json`: "model 5 is in force", and what that changes. Gives the verb's exit code.
-int write_result(const wire::ChangeReport& report, bool json);
+// Unless `json`: "model 5 is in force", what that changes, and which open ports it does not
+// mention. Gives the verb's exit code.
+int write_result(const wire::ChangeReport& report, const std::string& verb,
+                 const std::string& instance, bool json);
 
 }  // namespace arbiter::cli

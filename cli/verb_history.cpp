@@ -61,7 +61,7 @@ int rollback(const RollbackOptions& options) {
   question.kind = wire::MessageKind::kRollback;
   question.link = options.generation;
   return write_result(ask_for_change("rollback", options.instance, question, options.json),
-                      options.json);
+                      "rollback", options.instance, options.json);
 }
 
 }  // namespace

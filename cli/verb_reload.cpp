@@ -32,7 +32,9 @@ int reload(const ReloadOptions& options) {
   question.kind = wire::MessageKind::kReload;
   question.flags = options.dry_run ? wire::kDryRun : 0u;
   const auto report = ask_for_change("reload", options.instance, question, options.json);
-  if (!options.dry_run || options.json || !report.ok) return write_result(report, options.json);
+  if (!options.dry_run || options.json || !report.ok) {
+    return write_result(report, "reload", options.instance, options.json);
+  }
   const auto models = report.models.value_or(std::vector<wire::ModelComparison>());
   for (const auto& model : models) write_changes(model, models.size() == 1);
   if (report.policy && report.policy->differs) {

@@ -61,6 +61,20 @@ TEST(Unmentioned, AReloadNamesFilesFromHere) {
               HasSubstr("cannot open " + whole + ": No such"));
 }
 
+TEST(Unmentioned, AChangeNamesInputPortsThatGetNothingFromNowOn) {
+  Daemon daemon(kFaceUnlessStop);
+  Node node("test");
+  auto in = node.input_port("/Gaze/pos:i");
+  auto out = node.output_port("/other:o");
+  EXPECT_THAT(arbiter({"reload"}).out, Not(HasSubstr("open")));
+  daemon.write_model("<behaviors><behavior name='A'><config at='/Arm/pos:i'>/a:o</config>"
+                     "</behavior></behaviors>");
+  EXPECT_THAT(arbiter({"reload"}).out,
+              HasSubstr("\n  open, but not mentioned by this model, so that no sample arrives: "
+                        "/Gaze/pos:i\n"));
+  EXPECT_THAT(arbiter({"rollback"}).out, Not(HasSubstr("open")));
+}
+
 TEST(Unmentioned, AWatcherSaysThatNobodyHasNamedThePort) {
   Daemon daemon(kFaceUnlessStop);
   const auto result = arbiter({"echo", "/Gaze/po:i", "--for", "1ms"});
