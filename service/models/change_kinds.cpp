@@ -197,10 +197,11 @@ std::string ModelChanges::why_none_before() const {
     return "there is no older model to go back to: " + generation + " decides as " + content +
            " did, which has left the history; arbiter history shows what is in it";
   }
-  return (latest->generation == latest->content
-              ? content + " is the oldest that is kept"
-              : generation + " decides as " + content + " does, the oldest that is kept") +
-         "; arbiter history shows all";
+  if (latest->generation == latest->content) {
+    return content + " is the oldest that is kept; arbiter history shows all";
+  }
+  return generation + " decides as " + content +
+         " does, the oldest that is kept; to go to another, say which: arbiter history shows all";
 }
 
 // The one to go back to. Throws std::runtime_error saying why there is none.

@@ -262,9 +262,9 @@ TEST_F(ChangingModels, RollbackGoesBackStepByStepOrToOneByItsNumber) {
   EXPECT_THAT(arbiter({"switch"}).out, HasSubstr("(after a rollback, an older one is in force)"));
   ASSERT_EQ(arbiter({"rollback"}).exit_code, 0);
   EXPECT_EQ(source_in_force(), "/a");
-  expect_refusal(
-      arbiter({"rollback"}),
-      "model 5 decides as model 1 does, the oldest that is kept; arbiter history shows all");
+  expect_refusal(arbiter({"rollback"}),
+                 "model 5 decides as model 1 does, the oldest that is kept; to go to another, say "
+                 "which: arbiter history shows all");
   ASSERT_EQ(arbiter({"rollback", "3"}).exit_code, 0);
   EXPECT_EQ(source_in_force(), "/c");
   expect_refusal(arbiter({"rollback", "9"}),
@@ -300,14 +300,14 @@ TEST_F(ChangingModels, AModelThatStaysAsItIsIsNoStepAfterARollbackEither) {
   ASSERT_EQ(source_in_force(), "/a");
   ASSERT_EQ(arbiter({"reload"}).exit_code, 0);
   ASSERT_EQ(arbiter({"reload"}).exit_code, 0);
-  expect_refusal(
-      arbiter({"rollback"}),
-      "model 6 decides as model 1 does, the oldest that is kept; arbiter history shows all");
+  expect_refusal(arbiter({"rollback"}),
+                 "model 6 decides as model 1 does, the oldest that is kept; to go to another, say "
+                 "which: arbiter history shows all");
   ASSERT_EQ(arbiter({"rollback", "1"}).exit_code, 0);
   ASSERT_EQ(arbiter({"switch", "default"}).exit_code, 0);
-  expect_refusal(
-      arbiter({"rollback"}),
-      "model 8 decides as model 1 does, the oldest that is kept; arbiter history shows all");
+  expect_refusal(arbiter({"rollback"}),
+                 "model 8 decides as model 1 does, the oldest that is kept; to go to another, say "
+                 "which: arbiter history shows all");
 }
 
 TEST_F(ChangingModels, HistoryTellsWhatWhenHowAndByWhom) {
