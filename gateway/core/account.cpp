@@ -10,11 +10,13 @@
 namespace arbiter::gateway {
 namespace {
 
-// Of a reason: it comes from a middleware, or from far away.
+// They come from a middleware, or from far away. An obstacle ends with what to do about it.
+constexpr std::size_t kMaxObstacle = 400;
 constexpr std::size_t kMaxReason = 200;
 
 constexpr std::int64_t kOneSecond = 1'000'000'000;
 constexpr std::int64_t kRatePeriod = 2 * kOneSecond;
+constexpr std::int64_t kSteadyPeriod = 20 * kOneSecond;
 
 // Since the last sample; the longest first.
 constexpr std::array<std::pair<std::int64_t, const char*>, 5> kAges{{{86400 * kOneSecond, "a day"},
@@ -52,7 +54,7 @@ void Account::set_place(std::string place) {
 
 void Account::set_obstacle(std::string_view text, bool is_trouble) {
   const std::lock_guard lock(mutex_);
-  obstacle_ = fitting(text, kMaxReason);
+  obstacle_ = fitting(text, kMaxObstacle);
   is_trouble_ = is_trouble && !text.empty();
 }
 
@@ -82,24 +84,44 @@ std::string Account::state_of_topic() const {
 void Account::look(std::int64_t now) noexcept {
   const std::lock_guard lock(mutex_);
   const std::uint64_t count = passed.value();
-  if (count != passed_before_) passed_at_ = now;
+  const bool has_passed = count != passed_before_;
   passed_before_ = count;
   looked_at_ = now;
-  if (rate_since_ != 0 && now - rate_since_ < kRatePeriod) return;
-  const double rate = rate_since_ == 0 ? 0
-                                       : static_cast<double>(count - passed_since_) * 1e9 /
-                                             static_cast<double>(now - rate_since_);
-  // A period more or less of a steady publisher, or a little jitter, is no news.
-  if (rate == 0 || std::abs(rate - rate_) > std::max(0.2 * rate_, 1e9 / kRatePeriod)) rate_ = rate;
-  rate_since_ = now;
-  passed_since_ = count;
+  if (has_passed) passed_at_ = now;
+  if (is_silent_ && has_passed) {
+    is_silent_ = false;
+    recent_ = steady_ = {now, count};  // the silence before is no part of the rate
+  } else if (!is_silent_ && now - recent_.since >= kRatePeriod) {
+    measure(now, count);
+  }
+}
+
+double Account::Window::rate(std::int64_t now, std::uint64_t count) const noexcept {
+  return static_cast<double>(count - passed) * 1e9 / static_cast<double>(now - since);
+}
+
+// A period more or less of a steady publisher, or a little jitter, is no news; over a longer time
+// neither counts for much.
+void Account::measure(std::int64_t now, std::uint64_t count) noexcept {
+  const double rate = recent_.rate(now, count);
+  is_silent_ = rate == 0;
+  const double periods = 1.5e9 / static_cast<double>(now - recent_.since);
+  if (rate == 0 || std::abs(rate - rate_) > std::max(0.2 * rate_, periods)) {
+    rate_ = rate;
+    steady_ = {now, count};
+  } else if (now - steady_.since >= kSteadyPeriod) {
+    const double exact = steady_.rate(now, count);
+    if (std::abs(exact - std::round(rate_)) > std::max(0.02 * rate_, 0.6)) rate_ = exact;
+    steady_ = {now, count};
+  }
+  recent_ = {now, count};
 }
 
 std::string Account::traffic() const {
   if (passed.value() == 0) return "";
   const std::size_t size = last_size_.load(std::memory_order_relaxed);
   const std::string bytes = std::to_string(size) + (size == 1 ? " byte" : " bytes");
-  if (rate_ >= 1) {
+  if (rate_ >= 0.75) {
     const auto whole = static_cast<std::uint64_t>(std::llround(rate_));
     return ", " + std::to_string(whole) + (whole == 1 ? " sample" : " samples") +
            " a second, the last one has " + bytes;

@@ -83,6 +83,14 @@ class Account {
   [[nodiscard]] std::string state_of_topic() const;
   [[nodiscard]] std::string traffic() const;
 
+  // What samples are counted in.
+  struct Window {
+    std::int64_t since = 0;
+    std::uint64_t passed = 0;  // before
+    [[nodiscard]] double rate(std::int64_t now, std::uint64_t count) const noexcept;
+  };
+  void measure(std::int64_t now, std::uint64_t count) noexcept;
+
   std::atomic<std::size_t> last_size_{0};  // here, beside the counts: each sample writes both
   const std::string outside_;
   const std::string other_;
@@ -95,10 +103,11 @@ class Account {
   bool at_least_ = false;
   // As look() has found.
   std::int64_t looked_at_ = 0;
-  std::int64_t passed_at_ = 0;   // the last look at which another sample had passed
-  std::int64_t rate_since_ = 0;  // the begin of what rate_ is counted in
-  std::uint64_t passed_before_ = 0, passed_since_ = 0;
-  double rate_ = 0;  // of samples in a second; 0: not known
+  std::int64_t passed_at_ = 0;  // the last look at which another sample had passed
+  std::uint64_t passed_before_ = 0;
+  bool is_silent_ = true;
+  Window recent_, steady_;  // steady_: since rate_ has been about the same
+  double rate_ = 0;         // of samples in a second; 0: not known
 };
 
 }  // namespace arbiter::gateway

@@ -5,28 +5,27 @@
 namespace arbiter::gateway {
 namespace {
 
-// Of a common type of ROS 2 that has no field to choose by.
-bool has_no_field(Attributes& attributes, const SampleShape& shape, const Choice& choice) {
+// Of a common type of ROS 2 where nothing can choose, or not at that place.
+bool cannot_choose(Attributes& attributes, const SampleShape& shape, const Choice& choice) {
   const bool is_empty = shape.type == "std_msgs/msg/Empty";
-  const bool is_boolean = choice.field == Field::kBoolean;
-  // Behind its strings a number has a place of which only the user knows.
-  const bool is_unplaced = has_strings(shape.type) && (is_boolean || !attributes.has("offset"));
-  if (!is_empty && !is_unplaced) return false;
-  attributes.error(
-      "invalid-value", "type",
-      "a " + shape.type +
-          (is_empty     ? " says nothing, so that nothing in it can choose"
-           : is_boolean ? " has no Boolean field that could choose"
-                        : " begins with a string or a header, which cannot choose") +
-          " between two sources; write port=\"…\" in place of the two, or " +
-          (is_empty || is_boolean ? "map a topic of another type"
-                                  : "say with offset=\"…\" where the number is in each sample"));
+  if (is_empty || shape.type == "std_msgs/msg/String") {
+    attributes.error("invalid-value", "type",
+                     "a " + shape.type + (is_empty ? " says nothing" : " is a text of any length") +
+                         ", so that nothing in it can choose between two sources; write "
+                         "port=\"…\" in place of the two, or map a topic of another type");
+    return true;
+  }
+  if (!has_header(shape.type) || choice.offset >= kLeastHeader) return false;
+  attributes.error("invalid-value", attributes.has("offset") ? "offset" : "type",
+                   "a " + shape.type + " begins with a header of " + bytes_text(kLeastHeader) +
+                       " or more, which cannot choose between two sources; say with "
+                       "offset=\"…\" where the field is behind it, in each sample");
   return true;
 }
 
 // The common types of ROS 2 have fields of one kind each.
 bool check_kind(Attributes& attributes, const SampleShape& shape, const Choice& choice) {
-  if (shape.is_dds && has_no_field(attributes, shape, choice)) return false;
+  if (shape.is_dds && cannot_choose(attributes, shape, choice)) return false;
   const bool is_boolean = choice.field == Field::kBoolean;
   if (is_boolean && (attributes.has("above") || attributes.has("below"))) {
     return false;  // the field was refused

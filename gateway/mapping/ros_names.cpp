@@ -49,20 +49,36 @@ constexpr std::array<FixedType, 27> kFixedTypes{{
     {"std_msgs/msg/UInt8", 1, Field::kU8},
 }};
 
-constexpr std::array<std::string_view, 12> kWithStrings{{
+// They begin with a std_msgs/msg/Header; so do those of geometry_msgs that are called Stamped.
+constexpr std::array<std::string_view, 21> kWithHeader{{
     "ackermann_msgs/msg/AckermannDriveStamped",
-    "geometry_msgs/msg/AccelStamped",
-    "geometry_msgs/msg/PointStamped",
-    "geometry_msgs/msg/PoseStamped",
-    "geometry_msgs/msg/TransformStamped",
-    "geometry_msgs/msg/TwistStamped",
-    "geometry_msgs/msg/Vector3Stamped",
-    "geometry_msgs/msg/WrenchStamped",
+    "nav_msgs/msg/OccupancyGrid",
     "nav_msgs/msg/Odometry",
+    "nav_msgs/msg/Path",
+    "sensor_msgs/msg/BatteryState",
+    "sensor_msgs/msg/CameraInfo",
+    "sensor_msgs/msg/CompressedImage",
+    "sensor_msgs/msg/FluidPressure",
+    "sensor_msgs/msg/Illuminance",
+    "sensor_msgs/msg/Image",
+    "sensor_msgs/msg/Imu",
     "sensor_msgs/msg/JointState",
-    "std_msgs/msg/String",
+    "sensor_msgs/msg/Joy",
+    "sensor_msgs/msg/LaserScan",
+    "sensor_msgs/msg/MagneticField",
+    "sensor_msgs/msg/NavSatFix",
+    "sensor_msgs/msg/PointCloud2",
+    "sensor_msgs/msg/Range",
+    "sensor_msgs/msg/RelativeHumidity",
+    "sensor_msgs/msg/Temperature",
     "trajectory_msgs/msg/JointTrajectory",
 }};
+
+constexpr std::string_view kStamped = "Stamped";
+
+bool is_stamped_geometry(std::string_view ros_type) {
+  return ros_type.starts_with("geometry_msgs/msg/") && ros_type.ends_with(kStamped);
+}
 
 const FixedType* find_fixed(std::string_view ros_type) {
   const auto* const found =
@@ -141,19 +157,23 @@ std::optional<Field> field_of(std::string_view ros_type) {
 }
 
 std::optional<std::size_t> size_without_frame(std::string_view ros_type) {
-  constexpr std::string_view kStamped = "Stamped";
-  constexpr std::size_t kHeader = 16;  // its last three bytes align what follows, in XCDR2, too
+  // Its last three bytes align what follows, in XCDR2, too.
+  constexpr std::size_t kHeader = 16;
   // A transform has a second name behind its header.
-  if (!has_strings(ros_type) || !ros_type.ends_with(kStamped) ||
-      ros_type == "geometry_msgs/msg/TransformStamped") {
+  if (!is_stamped_geometry(ros_type) || ros_type == "geometry_msgs/msg/TransformStamped") {
     return std::nullopt;
   }
   const auto body = fixed_size_of(ros_type.substr(0, ros_type.size() - kStamped.size()));
   return body ? std::optional(kHeader + *body) : std::nullopt;
 }
 
+bool has_header(std::string_view ros_type) {
+  return is_stamped_geometry(ros_type) ||
+         std::find(kWithHeader.begin(), kWithHeader.end(), ros_type) != kWithHeader.end();
+}
+
 bool has_strings(std::string_view ros_type) {
-  return std::find(kWithStrings.begin(), kWithStrings.end(), ros_type) != kWithStrings.end();
+  return ros_type == "std_msgs/msg/String" || has_header(ros_type);
 }
 
 }  // namespace arbiter::gateway

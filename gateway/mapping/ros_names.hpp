@@ -34,7 +34,10 @@ namespace arbiter::gateway {
 [[nodiscard]] std::optional<std::size_t> fixed_size_of(std::string_view ros_type);
 // What each of their fields is.
 [[nodiscard]] std::optional<Field> field_of(std::string_view ros_type);
-// Of a common one that is a std_msgs/msg/Header and fields of one size, such as TwistStamped: how
+// Common ones that begin with a std_msgs/msg/Header: with a time, and the name of a frame.
+[[nodiscard]] bool has_header(std::string_view ros_type);
+inline constexpr std::size_t kLeastHeader = 13;  // bytes, if that name is empty
+// Of one that is a header and fields of one size, such as TwistStamped: how
 // many bytes it has if its frame's name is empty.
 [[nodiscard]] std::optional<std::size_t> size_without_frame(std::string_view ros_type);
 // Where that name's length is, which counts its final zero.

@@ -95,6 +95,32 @@ TEST(Account, ASteadyTopicDoesNotChangeItsText) {
   EXPECT_THAT(account.text(), HasSubstr("at least 1000 idle samples"));
 }
 
+// Its first sample came within the time that is counted, and it slows down a little later.
+TEST(Account, ARateBecomesRight) {
+  Account account("DDS topic rt/heartbeat", "publisher");
+  std::int64_t now = 100 * kSecond;
+  pass(account, now, 0);
+  pass(account, now, 3);
+  for (int i = 0; i < 4; ++i) pass(account, now, 5);
+  EXPECT_THAT(account.text(), HasSubstr(", 10 samples a second"));
+  for (int i = 0; i < 40; ++i) pass(account, now, 25);
+  EXPECT_THAT(account.text(), HasSubstr(", 50 samples a second"));
+  for (int i = 0; i < 100; ++i) pass(account, now, 20 + i % 2);
+  EXPECT_THAT(account.text(), HasSubstr(", 41 samples a second"));
+}
+
+TEST(Account, OneSampleASecondHasARateAndSteadily) {
+  Account account("DDS topic rt/heartbeat", "publisher");
+  std::int64_t now = 100 * kSecond;
+  std::set<std::string> texts;
+  for (int i = 0; i < 1000; ++i) {
+    pass(account, now, i % 2);
+    now += kSecond / 100;  // looks come a little late
+    if (i >= 100) texts.insert(account.text());
+  }
+  EXPECT_THAT(texts, testing::ElementsAre(HasSubstr(", 1 sample a second")));
+}
+
 // Somebody may send two kinds of bad samples in turn, for a year.
 TEST(Pauses, BecomeLongerWhileSomethingIsSaidAgainAndAgain) {
   Pauses pauses;
@@ -125,6 +151,12 @@ TEST(Account, AnObstacleStandsInThePlaceOfPeers) {
   account.set_obstacle("");
   EXPECT_FALSE(account.is_trouble());
   EXPECT_EQ(account.text(), "iceoryx a/b/c, 3 subscribers matched");
+}
+
+TEST(Account, WhatToDoAboutAnObstacleIsNotCut) {
+  Account account("DDS topic rt/cmd_vel_nav", "publisher");
+  account.set_obstacle(std::string(330, 'x') + "; write reliability=\"best_effort\"");
+  EXPECT_THAT(account.text(), testing::EndsWith("x; write reliability=\"best_effort\""));
 }
 
 TEST(Account, WhatStrangersSayIsEscapedAndBounded) {

@@ -18,6 +18,8 @@ TEST(Mapping, ZerosAreNoSampleOfATypeWithStrings) {
   };
   EXPECT_THAT(out("geometry_msgs/msg/TwistStamped", "size='80'").message(),
               HasSubstr("has a string in it"));
+  EXPECT_THAT(out("geometry_msgs/msg/PoseWithCovarianceStamped", "size='368'").message(),
+              HasSubstr("has a string in it"));
   for (const char* type : {"geometry_msgs/msg/TransformStamped", "nav_msgs/msg/Odometry"}) {
     EXPECT_THAT(out(type, "").message(), HasSubstr("has strings or sequences, of which zero"));
   }
