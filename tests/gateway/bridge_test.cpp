@@ -420,8 +420,10 @@ TEST(Ending, SaysStopWhoeverCommandsAndNothingBehindIt) {
     sent = gateway.middleware.sent();
   };
   gateway.end();
-  ASSERT_GE(sent.size(), 2u);
-  EXPECT_EQ(sent.back(), kZeros);
+  // The network may lose one.
+  ASSERT_GE(sent.size(), 4u);
+  EXPECT_THAT(std::vector(sent.end() - 4, sent.end()),
+              testing::ElementsAre("drive", kZeros, kZeros, kZeros));
 }
 
 // Where another gateway serves the entry, a stop would be a command of its own.

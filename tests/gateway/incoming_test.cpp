@@ -177,6 +177,45 @@ TEST_F(ArrivingBoolean, ASampleThatNobodyCanReadEndsBoth) {
   EXPECT_EQ(account_.unreadable.value(), 1u);
 }
 
+// Its field can be read, and then its memory is gone.
+TEST_F(ArrivingBoolean, ASampleThatIsReadInPartEndsBoth) {
+  class ReadInPart : public BytesSample {
+   public:
+    using BytesSample::BytesSample;
+    [[nodiscard]] bool copy(std::size_t from, WritableBytes to) const noexcept override {
+      return to.size() == 1 && BytesSample::copy(from, to);
+    }
+  };
+  say(true);
+  EXPECT_EQ(incoming_.deliver(ReadInPart(std::string("\0\1\0\0\1", 5), 4), kNever),
+            Fate::kUnreadable);
+  EXPECT_FALSE(is_active("/pressed:o"));
+  EXPECT_FALSE(is_active("/released:o"));
+}
+
+// What was said before a reader came may count only where nothing that it says ends by itself.
+TEST_F(ArrivingBoolean, ATopicIsForEverIfBothItsSourcesAreAndItHasNoMaxAge) {
+  const auto is_forever = [&](const std::string& pressed, const std::string& released,
+                              const std::string& more) {
+    daemon_.load("<behaviors><source port='/pressed:o' timeout='" + pressed +
+                 "'/><source port='/released:o' timeout='" + released +
+                 "'/><behavior name='Drive'><config at='/Base/cmd:i'>/Nav/cmd:o</config>"
+                 "<condition>not /pressed:o or /released:o</condition></behavior></behaviors>");
+    const Read read = read_dds(
+        "<in topic='/lock' type='std_msgs/msg/Bool' true='/pressed:o' false='/released:o' " + more +
+        "/>");
+    MaxAges ages("");
+    MaxAge age;
+    ages.add(read.entry(), age);
+    EXPECT_TRUE(age.is_known());
+    return age.is_forever();
+  };
+  EXPECT_TRUE(is_forever("forever", "forever", ""));
+  EXPECT_FALSE(is_forever("forever", "1s", ""));
+  EXPECT_FALSE(is_forever("1s", "forever", ""));
+  EXPECT_FALSE(is_forever("forever", "forever", "max_age='1s'"));
+}
+
 TEST_F(ArrivingBoolean, ALateSampleMakesNothingActiveAndEndsTheOther) {
   say(false);
   EXPECT_EQ(say(true, kPassed), Fate::kLate);
