@@ -105,7 +105,7 @@ void Desk::close() {
 
 OtherLinks Desk::others() const {
   const std::lock_guard lock(mutex_);
-  OtherLinks others{round_trips_.deaf(), {}};
+  OtherLinks others{round_trips_.deaf(), {}, round_trips_.pulsing()};
   for (const Neighbour& each : neighbours_.all()) {
     if (each.is_up) others.cards.emplace(each.participant, each.card);
   }
@@ -177,7 +177,7 @@ void Desk::look_who_is_there(shm::Nanoseconds now) {
   std::set<std::string> hosts_there;
   {
     const std::lock_guard lock(mutex_);
-    neighbours_.keep(writers, now);
+    neighbours_.keep(writers, now, round_trips_.pulsing());
     without_place = neighbours_.without_place();
     std::set<Participant> there;
     for (const Neighbour& each : neighbours_.all()) {

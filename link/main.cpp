@@ -1,9 +1,11 @@
 // arbiter-link: joins this host's daemon with those of other hosts (docs/hosts.md).
+#include <arpa/inet.h>
 #include <netdb.h>
 #include <sys/socket.h>
 #include <systemd/sd-daemon.h>
 
 #include <chrono>
+#include <cstdint>
 #include <exception>
 #include <future>
 #include <set>
@@ -60,6 +62,13 @@ void require_interfaces(const std::vector<std::string>& interfaces) {
                                  "is empty: name a network interface, such as eth0, or leave it "
                                  "out, so that nothing leaves this machine");
     }
+    in6_addr ignored{};
+    if (inet_pton(AF_INET6, each.substr(0, each.find('%')).c_str(), &ignored) == 1) {
+      throw CLI::ValidationError("--interface",
+                                 rules::quote(each) +
+                                     " is an address of IPv6, and links talk by IPv4: write the "
+                                     "name of the interface, such as eth0, or its IPv4 address");
+    }
     if (!seen.insert(each).second) {
       throw CLI::ValidationError("--interface",
                                  "names " + rules::quote(each) + " twice: once is enough");
@@ -67,11 +76,21 @@ void require_interfaces(const std::vector<std::string>& interfaces) {
   }
 }
 
-// Why no address of it is known: an error of getaddrinfo(); 0: one is. DDS takes ADDRESS:PORT, too.
+bool is_port(const std::string& text) {
+  constexpr std::size_t kMostDigits = 5;
+  return !text.empty() && text.size() <= kMostDigits &&
+         text.find_first_not_of("0123456789") == std::string::npos && std::stoi(text) > 0 &&
+         std::stoi(text) <= UINT16_MAX;
+}
+
+// Why no address of it is known that links can use: an error of getaddrinfo(); 0: one is. DDS takes
+// ADDRESS:PORT, too.
 int find_no_address(const std::string& peer) {
   const std::size_t colon = peer.find(':');
   const bool has_port = colon != std::string::npos && colon == peer.rfind(':');
+  if (has_port && !is_port(peer.substr(colon + 1))) return EAI_NONAME;
   addrinfo hints{};
+  hints.ai_family = AF_INET;
   hints.ai_socktype = SOCK_DGRAM;
   addrinfo* found = nullptr;
   const std::string host = has_port ? peer.substr(0, colon) : peer;
@@ -94,11 +113,13 @@ void require_peers(const NetworkOptions& network) {
     const int error = find_no_address(peer);
     if (error == 0) continue;
     const std::string about = rules::quote(peer);
-    if (error == EAI_NONAME) {
-      throw CLI::ValidationError("--peer", about +
-                                               " is neither an address nor the name of a host that "
-                                               "this machine knows; write its address, such as "
-                                               "192.168.1.12, or put the name into /etc/hosts");
+    if (error == EAI_NONAME || error == EAI_ADDRFAMILY || error == EAI_NODATA) {
+      throw CLI::ValidationError("--peer",
+                                 about +
+                                     " is neither an IPv4 address nor the name of a host of which "
+                                     "this machine knows one; links talk by IPv4: write its "
+                                     "address, such as 192.168.1.12, or put the name into "
+                                     "/etc/hosts");
     }
     gateway::say(gateway::Level::kWarning,
                  "the address of --peer " + about + " cannot be found out now (" +

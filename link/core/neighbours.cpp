@@ -34,7 +34,7 @@ bool Neighbours::note(std::uint64_t key, HostCard card, shm::Nanoseconds now,
     return true;
   }
   if (!make_place()) {
-    turn_away(key, card.host, now);
+    turn_away(key, card.host, now, participant);
     return false;
   }
   turned_away_.erase(key);
@@ -58,9 +58,10 @@ bool Neighbours::make_place() {
   return true;
 }
 
-void Neighbours::turn_away(std::uint64_t key, const std::string& host, shm::Nanoseconds now) {
+void Neighbours::turn_away(std::uint64_t key, const std::string& host, shm::Nanoseconds now,
+                           const Participant& participant) {
   if (turned_away_.size() < kMostWithoutPlace || turned_away_.contains(key)) {
-    turned_away_[key] = {host, now};
+    turned_away_[key] = {host, now, participant};
   }
 }
 
@@ -70,12 +71,17 @@ void Neighbours::remember(const std::string& host, shm::Nanoseconds gone_since) 
   }
 }
 
-void Neighbours::keep(std::vector<std::uint64_t> keys, shm::Nanoseconds then) {
+void Neighbours::keep(std::vector<std::uint64_t> keys, shm::Nanoseconds then,
+                      const std::optional<std::set<Participant>>& pulsing) {
   const std::uint64_t before = changes_;
   std::sort(keys.begin(), keys.end());
+  const IsThere is_there = [&](std::uint64_t key, shm::Nanoseconds heard, const Participant& from) {
+    if (heard >= then) return true;
+    const bool may_pulse = !pulsing || pulsing->contains(from) || then - heard < kUnheard;
+    return may_pulse && std::binary_search(keys.begin(), keys.end(), key);
+  };
   for (Neighbour& each : all_) {
-    if (!each.is_up || each.heard >= then) continue;
-    if (std::binary_search(keys.begin(), keys.end(), each.key)) continue;
+    if (!each.is_up || is_there(each.key, each.heard, each.participant)) continue;
     each.is_up = false;
     each.key = 0;
     each.since = then;
@@ -89,15 +95,15 @@ void Neighbours::keep(std::vector<std::uint64_t> keys, shm::Nanoseconds then) {
     // The later: its next life is here already.
     return !each.is_up && (then - each.since >= kRemembered || up.contains(each.card->host));
   });
-  keep_count(keys, then);
+  keep_count(is_there, then);
   if (changes_ != before) put_in_order();
 }
 
 // As for those that have a place.
-void Neighbours::keep_count(const std::vector<std::uint64_t>& keys, shm::Nanoseconds then) {
+void Neighbours::keep_count(const IsThere& is_there, shm::Nanoseconds then) {
   std::erase_if(turned_away_, [&](const auto& each) {
     const auto& [key, card] = each;
-    if (card.heard >= then || std::binary_search(keys.begin(), keys.end(), key)) return false;
+    if (is_there(key, card.heard, card.participant)) return false;
     remember(card.host, then);
     return true;
   });

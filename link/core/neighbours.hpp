@@ -1,7 +1,8 @@
 // The hosts that a link knows: those whose links are there, and for some minutes those that were.
 //
-// A link is there while its card's writer is: the transport says when that is lost (a lease). A
-// link that is started again has another incarnation; its earlier life is then not listed as gone.
+// A link is there while its card's writer is: the transport says when that is lost (a lease). How
+// long a lease is, its host says itself, so who does not pulse either (pulse.hpp) is gone. A link
+// that is started again has another incarnation; its earlier life is then not listed as gone.
 //
 // Their number is bounded. Whoever has all hosts do something must not pass over one that has no
 // place, so those are counted: hosts that are there and found none, and those that are gone and
@@ -14,8 +15,11 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <memory>
+#include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -47,9 +51,13 @@ class Neighbours {
   // not come again by itself, so it stays without one until it has something new to say.
   bool note(std::uint64_t key, HostCard card, shm::Nanoseconds now,
             const Participant& participant = {});
+  // A link whose card has come is to pulse within that time.
+  static constexpr shm::Nanoseconds kUnheard = 10'000'000'000;
   // All writers that were there at that time, or later: whose is not among them is gone. Who has
-  // been heard since then may have come after they were counted, and is left alone.
-  void keep(std::vector<std::uint64_t> keys, shm::Nanoseconds then);
+  // been heard since then may have come after they were counted, and is left alone. `pulsing`: who
+  // pulses; nothing: it is not known.
+  void keep(std::vector<std::uint64_t> keys, shm::Nanoseconds then,
+            const std::optional<std::set<Participant>>& pulsing = {});
 
   // In the order of names, those that are up first.
   [[nodiscard]] const std::vector<Neighbour>& all() const noexcept { return all_; }
@@ -64,10 +72,14 @@ class Neighbours {
   struct TurnedAway {
     std::string host;
     shm::Nanoseconds heard = 0;
+    Participant participant{};
   };
   bool make_place();
-  void turn_away(std::uint64_t key, const std::string& host, shm::Nanoseconds now);
-  void keep_count(const std::vector<std::uint64_t>& keys, shm::Nanoseconds then);
+  void turn_away(std::uint64_t key, const std::string& host, shm::Nanoseconds now,
+                 const Participant& participant);
+  // Whether one is there, by its key, when it was heard, and whose writer it is.
+  using IsThere = std::function<bool(std::uint64_t, shm::Nanoseconds, const Participant&)>;
+  void keep_count(const IsThere& is_there, shm::Nanoseconds then);
   void remember(const std::string& host, shm::Nanoseconds gone_since);
   void bound_names();
   void put_in_order();

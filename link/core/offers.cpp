@@ -55,13 +55,15 @@ void Offers::judge(Seen& seen, const OtherLinks& others, shm::Nanoseconds now) c
   const bool is_named =
       found == others.cards.end() || found->second->output_count != found->second->outputs.size() ||
       std::binary_search(found->second->outputs.begin(), found->second->outputs.end(), source_);
-  if (is_named) {
+  const bool pulses = !others.pulsing || others.pulsing->contains(seen.offer.participant);
+  const bool stands = is_named && pulses;
+  if (stands) {
     seen.unnamed = 0;
   } else if (seen.unnamed == 0) {
     seen.unnamed = now;
   }
   seen.is_over = is_newer(newest_.at(seen.offer.participant), seen.offer.card.incarnation) ||
-                 (!is_named && now - seen.unnamed >= kUnnamed);
+                 (!stands && now - seen.unnamed >= kUnnamed);
 }
 
 const Offer* Offers::speaker() const {

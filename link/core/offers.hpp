@@ -4,7 +4,9 @@
 // hears again it tells what stands there, not what has ended meanwhile. So an offer is not believed
 // for as long as the transport keeps it:
 //   - of those of one participant only the newest is true: a host has a source open once;
-//   - one whose host says otherwise is over: its card (host_card.hpp) names what is open there.
+//   - one whose host says otherwise is over: its card (host_card.hpp) names what is open there;
+//   - so is one whose host does not pulse (pulse.hpp): for how long the transport keeps what it has
+//     heard of a host, that host itself has said.
 //
 // Units: nanoseconds of a monotonic clock. Thread safety: none of its own.
 #pragma once
@@ -12,6 +14,7 @@
 #include <cstdint>
 #include <map>
 #include <memory>
+#include <optional>
 #include <set>
 #include <string>
 #include <vector>
@@ -39,14 +42,15 @@ struct OtherLinks {
   // They do not hear this link (pulse.hpp), and so do not speak to it.
   std::set<Participant> deaf;
   std::map<Participant, std::shared_ptr<const HostCard>> cards;  // none is null
+  std::optional<std::set<Participant>> pulsing{};                // nothing: it is not known
 };
 
 class Offers {
  public:
   // Twice the lease: an earlier life of a host is not believed to live for so long.
   static constexpr shm::Nanoseconds kNoEarlierLife = 3'000'000'000;
-  // A host that does not name the source for so long does not have it: a card comes later than the
-  // offer, and on a bad network much later.
+  // A host that does not name the source for so long, or does not pulse, does not have it: cards
+  // and pulses come later than the offer, and on a bad network much later.
   static constexpr shm::Nanoseconds kUnnamed = 3'000'000'000;
 
   explicit Offers(std::string source) : source_(std::move(source)) {}
@@ -65,7 +69,7 @@ class Offers {
   struct Seen {
     Offer offer;
     shm::Nanoseconds since = 0;
-    shm::Nanoseconds unnamed = 0;  // since when its host does not name the source; 0: it does
+    shm::Nanoseconds unnamed = 0;  // since when its host does not stand by it; 0: it does
     bool is_over = false;
   };
   void find_newest(const std::vector<Offer>& offers);

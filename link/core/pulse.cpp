@@ -56,7 +56,7 @@ Pulse RoundTrips::next(shm::Nanoseconds now) {
 
 void RoundTrips::note(const Pulse& pulse, const Participant& from, shm::Nanoseconds now) {
   if (pulse.sender == me_) return;
-  if (others_.size() >= kMaxEchoes && !others_.contains(from)) return;
+  if (!others_.contains(from) && !make_place()) return;
   Other& other = others_[from];
   if (other.life == 0) {
     other.life = pulse.sender;
@@ -65,6 +65,7 @@ void RoundTrips::note(const Pulse& pulse, const Participant& from, shm::Nanoseco
   if (pulse.sender != other.life || pulse.number <= other.number) return;
   other.number = pulse.number;
   other.came = now;
+  other.came_at = last_;
   for (const Echo& echo : pulse.echoes) {
     if (echo.of != me_ || echo.number == 0 || echo.number > last_ || last_ - echo.number >= kKept) {
       continue;
@@ -75,6 +76,11 @@ void RoundTrips::note(const Pulse& pulse, const Participant& from, shm::Nanoseco
     if (passed < 0 || echo.lay > static_cast<std::uint64_t>(passed)) continue;
     other.round_trip = passed - static_cast<shm::Nanoseconds>(echo.lay);
   }
+}
+
+bool RoundTrips::make_place() {
+  if (others_.size() < kMaxEchoes) return true;
+  return std::erase_if(others_, [&](const auto& each) { return !pulses(each.second); }) != 0;
 }
 
 void RoundTrips::keep(const std::set<Participant>& there) {
@@ -90,6 +96,15 @@ std::set<Participant> RoundTrips::deaf() const {
     if (last_ - other.echoed >= kUnechoed) deaf.insert(participant);
   }
   return deaf;
+}
+
+std::optional<std::set<Participant>> RoundTrips::pulsing() const {
+  std::set<Participant> pulsing;
+  for (const auto& [participant, other] : others_) {
+    if (pulses(other)) pulsing.insert(participant);
+  }
+  if (pulsing.size() >= kMaxEchoes) return std::nullopt;
+  return pulsing;
 }
 
 std::optional<shm::Nanoseconds> RoundTrips::of(const Participant& other) const {

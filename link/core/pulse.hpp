@@ -48,18 +48,23 @@ class RoundTrips {
   // Who has echoed none of so many pulses in a row does not hear this link. That is two seconds in
   // which this link ran: while it is held up it sends none.
   static constexpr std::uint64_t kUnechoed = 8;
+  // Who has not pulsed while so many were sent does not pulse any more: kSilence, counted so.
+  static constexpr std::uint64_t kUnheard = kSilence / kPulsePeriod;
 
   explicit RoundTrips(Incarnation me) : me_(me) {}
 
   // The next pulse, which is sent after this call.
   [[nodiscard]] Pulse next(shm::Nanoseconds now);
-  // One that has come. Senders that find no place are passed over.
+  // One that has come. Who does not pulse any more gives way to others; senders that find no place
+  // are passed over.
   void note(const Pulse& pulse, const Participant& from, shm::Nanoseconds now);
   // Who is there, of all others: those who were and are no more are forgotten at once, and who has
   // not come yet after kSilence.
   void keep(const std::set<Participant>& there);
   // Those that have pulsed, and do not hear this link, as far as it can know.
   [[nodiscard]] std::set<Participant> deaf() const;
+  // Those that pulse; nothing: it is not known, because they are more than find a place.
+  [[nodiscard]] std::optional<std::set<Participant>> pulsing() const;
   // The last that was measured; nothing: none.
   [[nodiscard]] std::optional<shm::Nanoseconds> of(const Participant& other) const;
 
@@ -69,10 +74,16 @@ class RoundTrips {
     Incarnation life = 0;
     std::uint64_t number = 0;
     shm::Nanoseconds came = 0;
-    std::uint64_t echoed = 0;  // our newest; before the first one that which it could not hear
+    std::uint64_t came_at = 0;  // our newest, when it came
+    std::uint64_t echoed = 0;   // our newest; before the first one that which it could not hear
     bool is_there = false;
     std::optional<shm::Nanoseconds> round_trip;
   };
+
+  [[nodiscard]] bool pulses(const Other& other) const noexcept {
+    return last_ - other.came_at < kUnheard;
+  }
+  bool make_place();
 
   const Incarnation me_;
   std::uint64_t last_ = 0;

@@ -17,7 +17,7 @@ bool Stream::note(Incarnation from, const StreamEvent& event) noexcept {
     ++doubled_;
     return false;
   }
-  if (has_begun_) lost_ += missed(exporter, event);
+  if (has_begun_) lost_ += std::min(missed(exporter, event), ~lost_);  // it never begins again
   has_begun_ = has_begun_ || !event.is_unasked;
   exporter.last = event.number;
   exporter.sequence = event.sequence;

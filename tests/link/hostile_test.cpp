@@ -58,6 +58,7 @@ class HostileHost : public LoopbackHosts {
   Host base_{"base", runtime_, motor_model(timeout_), network()};
   Body body_{base_};
   const link::Network network_{{domain_.number(), {}, {}}};
+  const Pulses pulses_{network_};
   Stranger stranger_{network_};
 };
 

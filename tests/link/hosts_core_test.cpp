@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <set>
 #include <vector>
 
 #include "link/core/disagreements.hpp"
@@ -216,6 +217,25 @@ std::vector<std::uint64_t> fill(Neighbours& neighbours) {
     keys.push_back(key);
   }
   return keys;
+}
+
+// How long its writer is believed to be there, each host has said itself.
+TEST(NeighbouringHosts, ThatDoNotPulseAreGoneAndMissedForSomeMinutesOnly) {
+  Neighbours neighbours;
+  std::vector<std::uint64_t> there = fill(neighbours);  // of one participant
+  const Participant pulsing = participant(2);
+  EXPECT_FALSE(neighbours.note(999, host_card("more", 999), kS));
+  EXPECT_FALSE(neighbours.note(1000, host_card("well", 1000), kS, pulsing));
+  there.insert(there.end(), {999, 1000});
+  neighbours.keep(there, kS + Neighbours::kUnheard);
+  EXPECT_TRUE(neighbours.all().front().is_up) << "it is not known who pulses";
+  neighbours.keep(there, kS + Neighbours::kUnheard - 1, std::set{pulsing});
+  EXPECT_TRUE(neighbours.all().front().is_up) << "pulses may come later";
+  neighbours.keep(there, kS + Neighbours::kUnheard, std::set{pulsing});
+  EXPECT_FALSE(neighbours.all().front().is_up);
+  neighbours.keep(there, kS + Neighbours::kUnheard + Neighbours::kRemembered, std::set{pulsing});
+  EXPECT_TRUE(neighbours.all().empty());
+  EXPECT_EQ(neighbours.without_place(), 1U) << "that one is there";
 }
 
 // Whoever has all hosts switch would pass over them.

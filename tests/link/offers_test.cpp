@@ -92,6 +92,22 @@ TEST(Offers, OfAHostWithMorePortsThanItCanNameStand) {
   }
 }
 
+// Its lease is what it says itself: it may be gone.
+TEST(Offers, OfAHostThatDoesNotPulseAreOver) {
+  Offers offers(kImage);
+  const std::vector<Offer> both{offer(1, "far", 11, 1), offer(2, "head", 22, 2)};
+  OtherLinks others;
+  others.pulsing = {Participant{2}};
+  offers.look({both[0]}, others, kOneSecond);
+  offers.look(both, others, kOneSecond + Offers::kUnnamed - 1);
+  EXPECT_EQ(offers.speaker()->card.host, "far") << "its pulses may come later";
+  offers.look(both, others, kOneSecond + Offers::kUnnamed);
+  EXPECT_EQ(offers.speaker()->card.host, "head");
+  others.pulsing.reset();
+  offers.look(both, others, 5 * kOneSecond);
+  EXPECT_THAT(offers.hosts(), ElementsAre("far", "head")) << "it is not known who pulses";
+}
+
 TEST(Offers, OfTwoMachinesWithOneNameAreNamedOnceNoneIsAnEarlierLife) {
   Offers offers(kImage);
   const std::vector<Offer> both{offer(1, "head", 11, 1), offer(2, "head", 22, 2)};

@@ -5,6 +5,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <optional>
+#include <set>
+
 #include "tests/link/messages_and_times.hpp"
 
 namespace arbiter::test {
@@ -13,6 +16,7 @@ namespace {
 using namespace link;
 using testing::ElementsAre;
 using testing::IsEmpty;
+using testing::Optional;
 
 // Their clocks have nothing to do with each other.
 TEST(RoundTrip, IsMeasuredWithoutComparingClocks) {
@@ -147,6 +151,40 @@ TEST(RoundTrip, KnowsABoundedNumberOfOthersAndForgetsThoseThatAreSilent) {
   const ByteString largest = write_pulse(me.next(2 * kS));
   EXPECT_TRUE(read_pulse(as_bytes(largest)));
   EXPECT_THAT(me.next(kS + RoundTrips::kSilence).echoes, IsEmpty());
+}
+
+// That a host has said something else, or is believed to live, does not count.
+TEST_F(Pulsing, OneThatDoesNotPulseForTenSecondsInWhichThisLinkRanDoesNotPulseAnyMore) {
+  EXPECT_THAT(me_.pulsing(), Optional(IsEmpty()));
+  pulse();
+  me_.keep({participant(2)});
+  now_ += 100 * kS;  // held up
+  EXPECT_THAT(me_.pulsing(), Optional(ElementsAre(participant(2))));
+  for (std::uint64_t i = 1; i < RoundTrips::kUnheard; ++i) pulse(false, true);
+  EXPECT_THAT(me_.pulsing(), Optional(ElementsAre(participant(2))));
+  pulse(false, true);
+  EXPECT_THAT(me_.pulsing(), Optional(IsEmpty()));
+  pulse();
+  EXPECT_THAT(me_.pulsing(), Optional(ElementsAre(participant(2))));
+}
+
+// Though the transport believes that they are there.
+TEST(RoundTrip, GivesThePlacesOfThoseThatPulseNoMoreToOthers) {
+  RoundTrips me(1);
+  std::set<Participant> there;
+  for (std::uint16_t other = 0; other < kMaxEchoes; ++other) {
+    const Participant from{1, static_cast<std::uint8_t>(other)};
+    me.note({2U + other, 1, {}}, from, kS);
+    there.insert(from);
+  }
+  me.keep(there);
+  EXPECT_EQ(me.pulsing(), std::nullopt) << "who finds no place may pulse, too";
+  for (std::uint64_t i = 1; i < RoundTrips::kUnheard; ++i) static_cast<void>(me.next(2 * kS));
+  me.note({1000, 1, {}}, participant(2), 2 * kS);
+  EXPECT_EQ(me.pulsing(), std::nullopt);
+  static_cast<void>(me.next(2 * kS));
+  me.note({1000, 1, {}}, participant(2), 2 * kS);
+  EXPECT_THAT(me.pulsing(), Optional(ElementsAre(participant(2))));
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <mutex>
 #include <optional>
 #include <string>
 #include <vector>
@@ -12,11 +13,46 @@
 #include "gateway/core/bridge.hpp"
 #include "link/core/cards.hpp"
 #include "link/core/event_header.hpp"
+#include "link/core/pulse.hpp"
 #include "link/dds/event_topic.hpp"
+#include "link/dds/message_topic.hpp"
 #include "link/dds/network.hpp"
+#include "link/desk_topics.hpp"
+#include "link/token_clock.hpp"
+#include "shm/clock.hpp"
 #include "tests/link/robot.hpp"
 
 namespace arbiter::test {
+
+// Says that it is there, and hears others, as links do: who does not is not believed for long.
+class Pulses {
+ public:
+  explicit Pulses(const link::Network& network, link::Incarnation life = 666)
+      : round_trips_(life),
+        topic_(
+            network, link::kPulseTopic, link::Delivery::kPulse, link::kMostPulseBytes,
+            [this](Bytes bytes, const gateway::dds::SampleWriter& writer) {
+              const auto pulse = link::read_pulse(bytes);
+              const std::lock_guard lock(mutex_);
+              if (pulse) round_trips_.note(*pulse, writer.participant, shm::monotonic_now());
+            },
+            bell_),
+        clock_([this] {
+          std::unique_lock lock(mutex_);
+          const link::ByteString pulse = link::write_pulse(round_trips_.next(shm::monotonic_now()));
+          lock.unlock();
+          static_cast<void>(topic_.send(pulse));
+        }) {
+    clock_.set_period(link::RoundTrips::kPulsePeriod);
+  }
+
+ private:
+  const gateway::Bell bell_;
+  std::mutex mutex_;
+  link::RoundTrips round_trips_;
+  link::MessageTopic topic_;
+  link::TokenClock clock_;
+};
 
 // A program on the network that says that it has the planner.
 class Stranger {

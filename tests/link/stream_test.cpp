@@ -70,6 +70,17 @@ TEST(Stream, CountsNothingBelowZeroWhateverAnExporterSays) {
 }
 
 // It tells of the source before its publisher has told it anything.
+// Or the count would begin at 0 again.
+TEST(Stream, CountsNoMoreThanTheLargestNumberWhateverExportersSay) {
+  constexpr std::uint64_t kMost = ~std::uint64_t{0};
+  Stream stream;
+  for (Incarnation exporter = 1; exporter <= 2; ++exporter) {
+    EXPECT_TRUE(stream.note(exporter, event(1, false)));
+    EXPECT_TRUE(stream.note(exporter, event(kMost, false)));
+  }
+  EXPECT_EQ(stream.lost(), kMost);
+}
+
 TEST(Stream, DoesNotMissWhatWasPublishedBeforeItsExporterJoined) {
   Stream stream;
   EXPECT_TRUE(stream.note(1, {1, 0, false, false}));
