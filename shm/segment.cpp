@@ -6,6 +6,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <stdexcept>
 #include <string>
@@ -13,6 +14,7 @@
 #include <boost/interprocess/exceptions.hpp>
 
 #include "shm/foreign.hpp"
+#include "shm/limits.hpp"
 #include "shm/lock_limit.hpp"
 
 namespace arbiter::shm {
@@ -75,10 +77,21 @@ void seal(const FileDescriptor& segment, Seals seals) {
   }
 }
 
+// Before Linux 6.8 a signal ends a call without a trace of what it has done: under a timer that is
+// faster than the whole, only parts come to an end.
 std::error_code allocate(const FileDescriptor& segment, std::size_t offset,
                          std::size_t bytes) noexcept {
-  while (fallocate(segment.get(), 0, static_cast<off_t>(offset), static_cast<off_t>(bytes)) != 0) {
-    if (errno != EINTR) return {errno, std::generic_category()};
+  std::size_t most = bytes;
+  while (bytes != 0) {
+    const std::size_t step = std::min(bytes, most);
+    if (fallocate(segment.get(), 0, static_cast<off_t>(offset), static_cast<off_t>(step)) == 0) {
+      offset += step;
+      bytes -= step;
+    } else if (errno == EINTR) {
+      most = std::max(step / 2, kPageSize);
+    } else {
+      return {errno, std::generic_category()};
+    }
   }
   return {};
 }
