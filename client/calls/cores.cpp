@@ -37,7 +37,8 @@ void switch_model(NodeCore& node, std::string_view name) {
   require_own(node);
   wire::Message question;
   question.kind = wire::MessageKind::kSwitch;
-  question.set_name(name);  // one that is cut off is no model's
+  question.set_name(name);
+  if (question.name_view() != name) question.set_name({});  // it was cut off: no model has it
   node.ask(question, {-1, -1});
 }
 
@@ -198,8 +199,8 @@ const std::string& source_name(const InputCore& core, std::uint32_t source) noex
 const Type& sample_type(const InputCore& core, std::uint32_t hold) noexcept {
   return core.type_of_held(hold);
 }
-Origin sample_origin(const InputCore& core, std::uint32_t hold) noexcept {
-  const shm::SampleOrigin origin = core.origin_of_held(hold);
+Origin sample_origin(const InputCore& core, const HeldSample& held) noexcept {
+  const shm::SampleOrigin origin = core.origin_of(held);
   return {origin.publisher, origin.sequence};
 }
 
@@ -241,7 +242,7 @@ int wait_descriptor(TapCore& core) {
 const std::string& name(const TapCore& core) noexcept { return core.name(); }
 std::uint64_t lost_events(const TapCore& core) noexcept { return core.lost_events(); }
 std::uint64_t lost_samples(const TapCore& core) noexcept { return core.lost_samples(); }
-Latencies latencies(TapCore& core) { return core.latencies(); }
+Latencies latencies(TapCore& core) { return is_own(core) ? core.latencies() : Latencies(); }
 
 // A publisher that lies, or whose memory is damaged, must not keep a motor from stopping, nor make
 // an age overflow.

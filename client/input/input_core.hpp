@@ -82,7 +82,7 @@ class InputCore {
     return held_from_[hold]->type;
   }
 
-  [[nodiscard]] shm::SampleOrigin origin_of_held(std::uint32_t hold) const noexcept;
+  [[nodiscard]] shm::SampleOrigin origin_of(const HeldSample& held) const noexcept;
 
   // Either.
 

@@ -370,14 +370,14 @@ void InputCore::give_back(std::uint32_t hold) noexcept {
   if (!lingering_.empty()) let_go_of(from);
 }
 
-// A slot that was copied may be known to be allocated by now: what is held stays as it is.
-shm::SampleOrigin InputCore::origin_of_held(std::uint32_t hold) const noexcept {
-  const OutputPeer& from = *held_from_[hold];
-  // Relaxed is enough: our own store.
-  const std::uint32_t slot =
-      shm::slot_of(segment_->header.holds[hold].load(std::memory_order_relaxed));
-  const bool is_allocated = slot < from.allocated_slots.load(std::memory_order_relaxed);
-  return is_allocated ? from.segment.slot_header(slot).origin() : copies_.origin(hold);
+// Its data tell where it lies, also to a child, which has no holds.
+shm::SampleOrigin InputCore::origin_of(const HeldSample& held) const noexcept {
+  const shm::OutputSegment& from = held_from_[held.hold]->segment;
+  const auto offset = reinterpret_cast<std::uintptr_t>(held.data) -
+                      reinterpret_cast<std::uintptr_t>(from.payload(0));
+  const std::uint64_t slot = offset / from.layout().stride;
+  if (slot >= from.layout().slot_count) return copies_.origin(held.hold);
+  return from.slot_header(static_cast<std::uint32_t>(slot)).origin();
 }
 
 // Of a publisher that is gone, with its last sample. The service thread unmaps it.

@@ -4,6 +4,7 @@
 
 #include "client/node/node_core.hpp"
 #include "shm/clock.hpp"
+#include "shm/utf8.hpp"
 
 namespace arbiter::detail {
 namespace {
@@ -18,17 +19,13 @@ constexpr std::size_t kMaxDescription = 511;
 // second sends no more than one that does so now and then.
 void NodeCore::describe(shm::PortInstance port, std::string_view text, bool is_trouble) noexcept
     try {
-  std::size_t length = std::min(text.size(), kMaxDescription);
-  while (length != 0 && length < text.size() &&
-         (static_cast<unsigned char>(text[length]) & 0xc0) == 0x80) {
-    --length;
-  }
+  text = shm::beginning_of(text.substr(0, text.find('\0')), kMaxDescription);
   {
     const std::lock_guard lock(mutex_);
     if (outputs_.count(port) + inputs_.count(port) == 0) return;
     Description& description = descriptions_[port];
-    if (description.text == text.substr(0, length) && description.is_trouble == is_trouble) return;
-    description.text = text.substr(0, length);
+    if (description.text == text && description.is_trouble == is_trouble) return;
+    description.text = text;
     description.is_trouble = is_trouble;
     description.is_said = false;
   }

@@ -6,6 +6,7 @@
 #include <deque>
 #include <exception>
 #include <mutex>
+#include <vector>
 
 namespace arbiter::detail {
 namespace {
@@ -24,21 +25,32 @@ struct RingingBell {
   bool has_thread = false;
 };
 
-std::mutex ended_mutex;  // of the next two
-std::deque<EndedNode> ended_nodes;
-std::vector<RingingBell> ringing_bells;
-// Of ended_nodes: whoever holds the mutex writes it. Relaxed, with no partner: it spares others the
+// Of this process. It outlives all static objects, which may be nodes. The first node makes it.
+struct EndedNodes {
+  static EndedNodes& all() {
+    static auto* const instance = new EndedNodes;
+    return *instance;
+  }
+
+  std::mutex mutex;  // of the next two
+  std::deque<EndedNode> nodes;
+  std::vector<RingingBell> bells;
+};
+
+// Of those nodes: whoever holds the mutex writes it. Relaxed, with no partner: it spares others the
 // mutex where there is none, and they read the list itself under the mutex.
 std::atomic<std::size_t> ended_count{0};
 
 // Another thread may hold the mutex at a fork, and the bells are the parent's.
 void begin_anew_in_children() {
-  static const int error = pthread_atfork([] { ended_mutex.lock(); }, [] { ended_mutex.unlock(); },
+  static const int error = pthread_atfork([] { EndedNodes::all().mutex.lock(); },
+                                          [] { EndedNodes::all().mutex.unlock(); },
                                           [] {
-                                            ended_nodes.clear();
-                                            ringing_bells.clear();
+                                            EndedNodes& ended = EndedNodes::all();
+                                            ended.nodes.clear();
+                                            ended.bells.clear();
                                             ended_count.store(0, std::memory_order_relaxed);
-                                            ended_mutex.unlock();
+                                            ended.mutex.unlock();
                                           });
   static_cast<void>(error);  // no memory: as without it
 }
@@ -47,7 +59,7 @@ void begin_anew_in_children() {
 std::shared_ptr<const ServiceBell> teller_for(const shm::SegmentIdentity& board,
                                               const ServiceBell* own) {
   std::shared_ptr<const ServiceBell> found;
-  for (const RingingBell& each : ringing_bells) {
+  for (const RingingBell& each : EndedNodes::all().bells) {
     if (!(each.board == board)) continue;
     auto bell = each.bell.lock();
     if (bell == nullptr || bell.get() == own) continue;
@@ -63,11 +75,12 @@ void remember_ended(const shm::SegmentIdentity& board, std::uint64_t node,
                     const ServiceBell* own) noexcept try {
   std::shared_ptr<const ServiceBell> teller;
   {
-    const std::lock_guard lock(ended_mutex);
+    EndedNodes& ended = EndedNodes::all();
+    const std::lock_guard lock(ended.mutex);
     teller = teller_for(board, own);
-    if (ended_nodes.size() == kMostEnded) ended_nodes.pop_front();
-    ended_nodes.push_back({board, node, teller});
-    ended_count.store(ended_nodes.size(), std::memory_order_relaxed);
+    if (ended.nodes.size() == kMostEnded) ended.nodes.pop_front();
+    ended.nodes.push_back({board, node, teller});
+    ended_count.store(ended.nodes.size(), std::memory_order_relaxed);
   }
   if (teller != nullptr) teller->ring();
 } catch (const std::exception&) {  // no memory: its name is kept until the process ends
@@ -82,8 +95,9 @@ std::vector<std::uint64_t> ended_in(const shm::SegmentIdentity& board) {
 std::vector<std::uint64_t> ended_to_tell(const shm::SegmentIdentity& board,
                                          const std::shared_ptr<const ServiceBell>& bell) {
   std::vector<std::uint64_t> nodes;
-  const std::lock_guard lock(ended_mutex);
-  for (EndedNode& each : ended_nodes) {
+  EndedNodes& ended = EndedNodes::all();
+  const std::lock_guard lock(ended.mutex);
+  for (EndedNode& each : ended.nodes) {
     if (!(each.board == board)) continue;
     if (bell != nullptr && each.teller.expired()) each.teller = bell;
     if (bell == nullptr || each.teller.lock() == bell) nodes.push_back(each.node);
@@ -93,23 +107,25 @@ std::vector<std::uint64_t> ended_to_tell(const shm::SegmentIdentity& board,
 
 void forget_ended(const shm::SegmentIdentity& board,
                   const std::set<std::uint64_t>& nodes) noexcept {
-  const std::lock_guard lock(ended_mutex);
-  std::erase_if(ended_nodes, [&](const EndedNode& each) {
+  EndedNodes& ended = EndedNodes::all();
+  const std::lock_guard lock(ended.mutex);
+  std::erase_if(ended.nodes, [&](const EndedNode& each) {
     return each.board == board && nodes.count(each.node) != 0;
   });
-  ended_count.store(ended_nodes.size(), std::memory_order_relaxed);
+  ended_count.store(ended.nodes.size(), std::memory_order_relaxed);
 }
 
 void ring_for_ended(const std::shared_ptr<const ServiceBell>& bell,
                     const shm::SegmentIdentity& board, bool has_thread) {
   begin_anew_in_children();
   {
-    const std::lock_guard lock(ended_mutex);
-    std::erase_if(ringing_bells, [&](const RingingBell& each) {
+    EndedNodes& ended = EndedNodes::all();
+    const std::lock_guard lock(ended.mutex);
+    std::erase_if(ended.bells, [&](const RingingBell& each) {
       const auto known = each.bell.lock();
       return known == nullptr || known == bell;
     });
-    ringing_bells.push_back({bell, board, has_thread});
+    ended.bells.push_back({bell, board, has_thread});
   }
   if (has_any_ended()) bell->ring();  // perhaps one that ended when no other node was there
 }

@@ -128,8 +128,9 @@ class NodeCore : public std::enable_shared_from_this<NodeCore> {
       std::vector<std::pair<shm::PortInstance, std::shared_ptr<const OutputPeer>>>& copied_from);
   void tidy_taps(
       std::vector<std::pair<shm::PortInstance, std::shared_ptr<const OutputPeer>>>& copied_from);
-  // When to look for what nobody will ring for, in milliseconds from now; -1: never.
-  [[nodiscard]] int look_again_in();
+  // Under mutex_: when to look for what nobody will ring for, in milliseconds from now; -1: never.
+  [[nodiscard]] int look_again_in() const noexcept;
+  void ring_when_to_look_again() const;
   // Descriptions (descriptions.cpp). Under mutex_: those that are due; when the next one is.
   void say_descriptions() noexcept;
   [[nodiscard]] shm::Nanoseconds next_description() const noexcept;
@@ -225,7 +226,9 @@ class NodeCore : public std::enable_shared_from_this<NodeCore> {
   const NodeOptions options_;
   std::string instance_;
   shm::FileDescriptor epoll_;
-  shm::FileDescriptor timer_;  // rings while there is no daemon, to look for one
+  // Rings while there is no daemon, to look for one; else, without a service thread, when to look
+  // again.
+  shm::FileDescriptor timer_;
   std::shared_ptr<const ServiceBell> service_bell_;
 
   std::mutex mutex_;

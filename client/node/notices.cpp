@@ -17,7 +17,7 @@ constexpr std::size_t kMaxNotices = 1024;
 }  // namespace
 
 const std::string& NodeCore::name_of_port(shm::PortInstance port) const {
-  static const std::string none;
+  static const std::string& none = *new std::string;  // outlives static nodes
   if (const auto output = outputs_.find(port); output != outputs_.end()) {
     return output->second->name();
   }

@@ -50,9 +50,12 @@ std::shared_ptr<OutputCore> NodeCore::open_output(std::string_view name, const T
   check_port_name(name);
   check_bounds<std::uint32_t>(name, "max_loans", options.max_loans, 1, shm::kMaxLoans);
   check_bounds<std::size_t>(name, "max_size", type.size(), 0, std::size_t{shm::kMaxTypeSize});
-  check_bounds<std::size_t>(name, "max_memory", options.max_memory,
-                            OutputCore::least_memory(as_info(type), options.max_loans),
-                            kMostMemory);
+  const std::size_t least = OutputCore::least_memory(as_info(type), options.max_loans);
+  if (least > kMostMemory) {
+    throw Error(std::string(name) + ": its samples need a max_memory of " + std::to_string(least) +
+                ", which is above the bound " + std::to_string(kMostMemory));
+  }
+  check_bounds<std::size_t>(name, "max_memory", options.max_memory, least, kMostMemory);
   return open(name, [&](const std::shared_ptr<SharedMemory>& memory) {
     auto core = std::make_shared<OutputCore>(std::string(name), type, options, memory);
     core->node = shared_from_this();

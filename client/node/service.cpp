@@ -69,17 +69,18 @@ void NodeCore::run_service_thread() {
   pthread_setname_np(pthread_self(), "arbiter-service");
   setpriority(PRIO_PROCESS, static_cast<id_t>(syscall(SYS_gettid)), kServiceNiceness);
   for (;;) {
+    int time = 0;
     {
       const std::lock_guard lock(mutex_);
       if (stopping_) return;
+      time = look_again_in();
     }
-    pump(look_again_in());
+    pump(time);
     give_notices();
   }
 }
 
-int NodeCore::look_again_in() {
-  const std::lock_guard lock(mutex_);
+int NodeCore::look_again_in() const noexcept {
   const bool has_to_tidy =
       has_ended_to_tell_ ||
       std::any_of(inputs_.begin(), inputs_.end(),
@@ -92,6 +93,13 @@ int NodeCore::look_again_in() {
   const shm::Nanoseconds left = std::max<shm::Nanoseconds>(0, due - shm::monotonic_now());
   const int description = static_cast<int>(left / 1'000'000) + 1;
   return tidy < 0 ? description : std::min(tidy, description);
+}
+
+// Whoever waits for service_fd() does not know when that is. Alone, the timer has its own time.
+void NodeCore::ring_when_to_look_again() const {
+  if (socket_ != nullptr) {
+    ring_timer_every(std::chrono::milliseconds(std::max(0, look_again_in())));
+  }
 }
 
 // Where there is a service thread, it does this.
@@ -115,11 +123,13 @@ void NodeCore::pump(int timeout_ms) {
     say_what_waits();
     say_who_has_ended(Whom::kOwn);
     say_descriptions();
+    if (!options_.service_thread) ring_when_to_look_again();
   }
+  std::uint64_t rings = 0;
+  const bool has_rung = ::read(timer_.get(), &rings, sizeof rings) > 0;
   const Socket socket = this->socket();
   if (socket == nullptr) {
-    std::uint64_t rings = 0;
-    if (::read(timer_.get(), &rings, sizeof rings) > 0) rejoin();
+    if (has_rung) rejoin();
     return;
   }
   wire::Received received;

@@ -179,7 +179,9 @@ void TapCore::look_at_inputs() {
 }
 
 void TapCore::fill(const Take& take, TapEventData& event) {
-  static const auto nobody = std::make_shared<const TapContext>();
+  // Never destroyed: static objects may be taps.
+  static const auto& nobody =
+      *new std::shared_ptr<const TapContext>(std::make_shared<const TapContext>());
   event = {};
   event.kind = take.news.is_overtaken ? kOvertaken : kDropped;
   event.time_ns = take.seen;

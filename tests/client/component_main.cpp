@@ -13,6 +13,7 @@
 #include <optional>
 #include <sstream>
 #include <string>
+#include <vector>
 
 #include <arbiter/arbiter.hpp>
 
@@ -23,6 +24,9 @@ namespace arbiter::test {
 // main() is to return.
 struct Returns {};
 
+// They end after all static objects of the library.
+std::vector<std::unique_ptr<Node>> static_nodes;
+
 class Component {
  public:
   std::string obey(const std::string& line) {
@@ -30,6 +34,7 @@ class Component {
     std::string verb;
     words >> verb;
     if (verb == "node") return node(words);
+    if (verb == "static-node") return static_node(words);
     if (verb == "output") return output(words);
     if (verb == "output-that-yields") return output(words, true);
     if (verb == "input") return input(words);
@@ -62,6 +67,12 @@ class Component {
     std::string name;
     words >> name;
     node_ = std::make_unique<Node>(name);
+    return "done";
+  }
+  static std::string static_node(std::istringstream& words) {
+    std::string name;
+    words >> name;
+    static_nodes.push_back(std::make_unique<Node>(name));
     return "done";
   }
   std::string output(std::istringstream& words, bool yields = false) {

@@ -143,5 +143,16 @@ TEST(Deaths, APortThatWasClosedIsFreeForItsOwnComponentAndForTheNext) {
   }
 }
 
+// The library's own static objects are made after those of a program that is linked with it, and
+// are gone before them.
+TEST(Deaths, NodesThatAreStaticObjectsEndUnheardWithTheirProcess) {
+  Daemon daemon(single_model());
+  Component component("test");
+  ASSERT_EQ(component.tell("static-node one"), "done");
+  ASSERT_EQ(component.tell("static-node two"), "done");
+  daemon.kill();
+  EXPECT_EQ(component.end(), 0);
+}
+
 }  // namespace
 }  // namespace arbiter::test

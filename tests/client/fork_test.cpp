@@ -221,6 +221,38 @@ TEST(Fork, WhatAComponentHeldAtTheForkItsChildMayReadAndDestroy) {
   EXPECT_EQ(take_from(*pair.in), 43);
 }
 
+TEST(Fork, OfASampleThatIsHeldAChildAlsoKnowsWhereItBegan) {
+  ConnectedPair pair;
+  // Not the first slot's, whose number a child reads where it has no holds.
+  for (std::uint64_t i = 1; i <= 3; ++i) {
+    pair.out->publish(std::move(*pair.out->loan()), Time::max(), {7, i});
+  }
+  static_cast<void>(pair.in->take());
+  const auto held = pair.in->take();
+  ASSERT_TRUE(held);
+  const auto origin = [&] {
+    const auto [publisher, sequence] = held->origin();
+    return std::to_string(publisher) + " " + std::to_string(sequence) + " " + held->source();
+  };
+  EXPECT_EQ(origin(), "7 2 /out");
+  for (auto* const make : {plain_fork, bare_clone})
+    EXPECT_EQ(in_child(origin, make).words, "7 2 /out");
+}
+
+TEST(Fork, AChildIsToldNothingOfATap) {
+  ConnectedPair pair;
+  Node watcher("watcher");
+  auto tap = watcher.tap("/in", {.of = TapOf::input});
+  await([&] { return !tap.latencies().buckets().empty(); });
+  const Said child = in_child([&] {
+    return std::to_string(tap.latencies().buckets().size()) + " " +
+           error_of([&] { static_cast<void>(tap.take()); });
+  });
+  EXPECT_EQ(child.status, 0);
+  EXPECT_THAT(child.words, HasSubstr("0 /in belongs to process "));
+  EXPECT_THAT(child.errors, HasSubstr("/in belongs to process "));
+}
+
 TEST(Fork, AChildMayMakeANodeOfItsOwnAndSoMayItsChild) {
   Daemon daemon(override_model());
   Node node("test");

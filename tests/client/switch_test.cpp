@@ -106,6 +106,8 @@ TEST_F(Switch, ToAModelThatThereIsNotNamesThoseThatThereAre) {
             "there is no model \"third\"; there are: default and other");
   EXPECT_THAT(error_of([&] { node.switch_model(""); }),
               HasSubstr("there is no model of that name; there are: "));
+  EXPECT_THAT(error_of([&] { node.switch_model(std::string_view("other\0", 6)); }),
+              HasSubstr("there is no model of that name; there are: "));
   EXPECT_THAT(error_of([&] { node.switch_model(std::string(1000, 'x')); }),
               HasSubstr("there are: default and other"));
   EXPECT_EQ(daemon_->generation(), 1u);

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <cmath>
 #include <limits>
 #include <thread>
 
@@ -47,6 +48,7 @@ TEST(Wait, ATimeThatHasPassedIsATimeOut) {
   }
   EXPECT_TRUE(in.wait_for(std::chrono::hours::min()).timed_out());
   EXPECT_TRUE(in.wait_for(std::chrono::duration<double>(1e-9)).timed_out());
+  EXPECT_TRUE(in.wait_for(std::chrono::duration<double>(std::nan(""))).timed_out());
 }
 
 TEST(Wait, AnyLengthOfTimeIsPossible) {

@@ -40,9 +40,7 @@ class SampleBase {
     return detail::sample_type(*core_, core_.get_deleter().hold);
   }
   // Where it began if its publisher passed it on (OutputPort::publish() with an origin). Wait-free.
-  [[nodiscard]] Origin origin() const noexcept {
-    return detail::sample_origin(*core_, core_.get_deleter().hold);
-  }
+  [[nodiscard]] Origin origin() const noexcept { return detail::sample_origin(*core_, held_); }
   // When it arrived: CLOCK_MONOTONIC, in nanoseconds. Its publisher wrote that time; if it lies in
   // the future, this returns the time of the first call instead, so that a motor can stop by a
   // sample's age. Reads the clock, about 30 ns.

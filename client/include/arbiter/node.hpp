@@ -42,6 +42,8 @@ class Node {
     core_.swap(other.core_);
     return *this;
   }
+  // What goes last, a copy or a port, blocks until a callback that runs has returned; and for a
+  // second or two if the daemon is there, but does not read.
   ~Node() { detail::drop_node(std::move(core_)); }
 
   // Opens an output port. Its name is the source of its connections. Blocks while the daemon
@@ -129,9 +131,10 @@ class Node {
   // allocates, and talks to the daemon.
   void switch_model(std::string_view name) { detail::switch_model(*core_, name); }
 
-  // Without a service thread: takes up the daemon's news, and calls on_notice on this thread. Does
-  // not wait for the daemon, but maps and allocates. With a service thread it does nothing.
-  // service_fd() is readable when there is something to do; the node owns the descriptor.
+  // Without a service thread: takes up the daemon's news, and calls on_notice on this thread. Maps
+  // and allocates. Waits for the daemon only if the last one has gone, and the next one, to which
+  // it hands back its ports, does not read: up to a second each time. With a service thread it does
+  // nothing. service_fd() is readable when there is something to do; the node owns the descriptor.
   void service() { detail::service(*core_); }
   [[nodiscard]] int service_fd() const noexcept { return detail::service_fd(*core_); }
 

@@ -115,9 +115,10 @@ class OutputPortBase {
 
   // Says what stands behind the port, for people: `arbiter status` shows it, and `arbiter why` says
   // "/Nav/cmd:o comes from …". A phrase such as "DDS topic rt/cmd, no publisher matched", at most
-  // 511 bytes, what is longer is cut; empty: nothing. The daemon hears it at most four times a
-  // second, the last word always; so does the next daemon. Takes a lock and allocates: call it when
-  // something has changed, off the data path. Any thread may call it while the port is open.
+  // 511 bytes; what is longer, or follows a zero byte, is cut; empty: nothing. The daemon hears it
+  // at most four times a second, the last word always; so does the next daemon. Takes a lock and
+  // allocates: call it when something has changed, off the data path. Any thread may call it while
+  // the port is open.
   void describe(std::string_view text) noexcept { detail::describe(*core_, text, false); }
   // In its place, where something is wrong that somebody should mend: `arbiter why` marks it, and
   // `arbiter doctor` reports it.

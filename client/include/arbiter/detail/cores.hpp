@@ -27,7 +27,7 @@ template <class Rep, class Period>
 std::int64_t saturated(std::chrono::duration<Rep, Period> timeout) noexcept {
   using Seconds = std::chrono::duration<double>;
   if (Seconds(timeout) > Seconds(std::chrono::hours(24 * 365))) return INT64_MAX;
-  if (timeout <= timeout.zero()) return 0;
+  if (!(timeout > timeout.zero())) return 0;  // nor is NaN
   return std::chrono::duration_cast<std::chrono::nanoseconds>(timeout).count();
 }
 
@@ -146,7 +146,7 @@ std::optional<std::string_view> winner(InputCore& core) noexcept;
 bool is_idle(InputCore& core) noexcept;
 const std::string& source_name(const InputCore& core, std::uint32_t source) noexcept;
 const Type& sample_type(const InputCore& core, std::uint32_t hold) noexcept;
-Origin sample_origin(const InputCore& core, std::uint32_t hold) noexcept;
+Origin sample_origin(const InputCore& core, const HeldSample& held) noexcept;
 std::int64_t believable_time(std::int64_t stamp_ns) noexcept;
 const std::string& name(const InputCore& core) noexcept;
 const Type& type(const InputCore& core) noexcept;
