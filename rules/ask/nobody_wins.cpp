@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "rules/ask/inhibition_circle.hpp"
 #include "rules/prove/proof.hpp"
 #include "rules/prove/winners.hpp"
 #include "rules/text/names.hpp"
@@ -19,10 +20,6 @@ constexpr std::size_t kMaxCauses = 16;
 constexpr std::size_t kMaxCausesTold = 8;
 // Chains reported for one port; there may be as many as cubes of sources.
 constexpr std::size_t kMaxChains = 4;
-// Circles of which statements say that nobody wins, before no more are looked for.
-constexpr std::size_t kMaxCirclesTried = 64;
-// Ways from one candidate to others that keep it out, looked at for more circles.
-constexpr std::size_t kMaxWays = 1024;
 
 class PortFindings {
  public:
@@ -31,7 +28,6 @@ class PortFindings {
       : rules_(rules), port_(port), statements_(statements), diagnostics_(diagnostics) {}
 
   void find(Budget& budget) {
-    budget_ = &budget;
     SourceOrder order;
     order.add(port_);
     add_sources(statements_, order);
@@ -45,12 +41,12 @@ class PortFindings {
       candidates_.push_back({&rule, std::move(wins)});
     }
     index_inhibitions();
-    if (statements_.empty()) warn_of_circle();  // it needs no states, which may be too large
+    if (statements_.empty()) warn_of_circle(budget);  // it needs no states, which may be too large
     find_states();
     leave_out_stated();
     if (!nobody_.is_false()) {
       note_states();
-      if (!statements_.empty()) warn_of_circle();  // behind them: it may outgrow a bound
+      if (!statements_.empty()) warn_of_circle(budget);  // behind them: it may outgrow a bound
       if (port_.in_order) throw DiagramLimit("a diagram of each winner, and those are too large");
       note_chains();
     }
@@ -173,68 +169,17 @@ class PortFindings {
 
   // Each of them wins only while the next one is inactive, the last while the first is. With all of
   // them active, and nobody else, nobody wins, which nobody means who gives priorities. One for a
-  // port. A circle of which a statement says that nobody wins is passed over: at first with its
-  // inhibitions, which leads far with few tries, then by itself.
-  void warn_of_circle() {
-    std::size_t tries = 0;
-    const Candidates in_circles = those_in_circles();
-    const std::vector<Candidates> all = keeps_out_;
-    for (std::size_t first = 0; first < candidates_.size(); ++first) {
-      while (in_circles[first]) {
-        const std::vector<std::size_t> circle = shortest_circle(first);
-        if (circle.empty()) break;
-        if (statements_.empty() || !is_stated(circle)) return warn_of(circle);
-        for (std::size_t i = 0; i < circle.size(); ++i) {
-          keeps_out_[circle[(i + 1) % circle.size()]].reset(circle[i]);
-        }
-        if (++tries == kMaxCirclesTried) return;
-      }
-    }
-    if (tries == 0) return;
-    keeps_out_ = all;
-    tries = 0;
-    for (std::size_t first = 0; first < candidates_.size(); ++first) {
-      if (in_circles[first] && ends_with_circle_of(first, tries)) return;
-    }
+  // port. A circle of which a statement says that nobody wins is passed over.
+  void warn_of_circle(Budget& budget) {
+    std::vector<Candidates> keeps_out;
+    for (const Candidate& each : candidates_) keeps_out.push_back(inhibited_by_[each.rule->source]);
+    const Circle circle = find_circle(std::move(keeps_out), budget,
+                                      [&](const Circle& tried) { return is_stated(tried); });
+    if (!circle.empty()) warn_of(circle);
   }
 
-  // Looks at the circles of a candidate and those behind it, the shortest first. True: one is told,
-  // or enough are tried.
-  bool ends_with_circle_of(std::size_t first, std::size_t& tries) {
-    std::vector<std::vector<std::size_t>> ways{{first}};
-    for (std::size_t at = 0; at < ways.size(); ++at) {
-      const std::vector<std::size_t> way = ways[at];
-      budget_->spend(way.size() * candidates_.size());  // to look along it for each that may follow
-      for (std::size_t next = first; next < candidates_.size(); ++next) {
-        if (!keeps_out_[next][way.back()]) continue;
-        if (next == first) {
-          const bool is_told = !is_stated(way);
-          if (is_told) warn_of(way);
-          if (is_told || ++tries == kMaxCirclesTried) return true;
-        } else if (ways.size() < kMaxWays && std::find(way.begin(), way.end(), next) == way.end()) {
-          ways.push_back(way);
-          ways.back().push_back(next);
-        }
-      }
-    }
-    return false;
-  }
-
-  // All of them, and some between two circles: without those that keep nobody out, without those
-  // that keep out nobody but them, and so on.
-  [[nodiscard]] Candidates those_in_circles() const {
-    Candidates left;
-    for (std::size_t i = 0; i < candidates_.size(); ++i) left.set(i);
-    for (Candidates before; before != left;) {
-      before = left;
-      for (std::size_t i = 0; i < candidates_.size(); ++i) {
-        if ((keeps_out_[i] & left).none()) left.reset(i);
-      }
-    }
-    return left;
-  }
-
-  bool is_stated(const std::vector<std::size_t>& circle) {
+  bool is_stated(const Circle& circle) {
+    if (statements_.empty()) return false;
     Diagram states = nobody_;
     for (std::size_t i = 0; i < candidates_.size(); ++i) {
       const bool is_of_it = std::find(circle.begin(), circle.end(), i) != circle.end();
@@ -244,7 +189,7 @@ class PortFindings {
     return states.is_false();
   }
 
-  void warn_of(const std::vector<std::size_t>& circle) {
+  void warn_of(const Circle& circle) {
     std::vector<std::string> names(circle.size());
     std::transform(circle.begin(), circle.end(), names.begin(),
                    [&](std::size_t each) { return candidates_[each].rule->source; });
@@ -261,52 +206,31 @@ class PortFindings {
                          {.ports = {port_.port}, .source = names.front()});
   }
 
-  // From a candidate to those that keep it out, breadth first, and back to it. Empty: there is
-  // none.
-  [[nodiscard]] std::vector<std::size_t> shortest_circle(std::size_t first) const {
-    std::vector<std::size_t> from(candidates_.size(), candidates_.size());
-    std::vector<std::size_t> reached{first};
-    for (std::size_t at = 0; at < reached.size(); ++at) {
-      for (std::size_t next = 0; next < candidates_.size(); ++next) {
-        if (!keeps_out_[next][reached[at]]) continue;
-        if (next == first) return way_to(reached[at], first, from);
-        if (from[next] != candidates_.size()) continue;
-        from[next] = reached[at];
-        reached.push_back(next);
-      }
-    }
-    return {};
-  }
-
-  static std::vector<std::size_t> way_to(std::size_t last, std::size_t first,
-                                         const std::vector<std::size_t>& from) {
-    std::vector<std::size_t> way{last};
-    while (way.back() != first) way.push_back(from[way.back()]);
-    std::reverse(way.begin(), way.end());
-    return way;
-  }
-
   // x is silenced by y, which z keeps from winning: x and y are active, nobody wins, x would win if
   // y alone were inactive, and y would win if z alone were inactive, where z is active and silences
   // it, or active, where its condition lacks z. Those that share y and z make one finding.
   void note_chains() {
-    std::size_t chains = 0;
+    std::size_t left = kMaxChains;
     for (const bool lacks_z : {false, true}) {
-      for (std::size_t y = 0; y < candidates_.size(); ++y) {
-        const auto& reads = candidates_[y].rule->reads;
-        std::optional<Diagram> with_y;
-        for (const auto& z : reads) {
-          if (chains == kMaxChains) return;
-          const Candidates silenced = may_be_silenced(y, z, lacks_z);
-          if (silenced.none()) continue;
-          if (!with_y) {
-            const auto& source = candidates_[y].rule->source;
-            with_y = winners_->combine(Connective::kAnd, nobody_, winners_->active(source));
-          }
-          chains += note_chain(candidates_[y], z, lacks_z, *with_y, silenced) ? 1 : 0;
-        }
-      }
+      for (std::size_t y = 0; y < candidates_.size(); ++y) left -= note_chains_of(y, lacks_z, left);
     }
+  }
+
+  // Those with this y, `most` of them. How many there are.
+  std::size_t note_chains_of(std::size_t y, bool lacks_z, std::size_t most) {
+    std::size_t noted = 0;
+    std::optional<Diagram> with_y;
+    for (const auto& z : candidates_[y].rule->reads) {
+      if (noted == most) break;
+      const Candidates silenced = may_be_silenced(y, z, lacks_z);
+      if (silenced.none()) continue;
+      if (!with_y) {
+        const auto& source = candidates_[y].rule->source;
+        with_y = winners_->combine(Connective::kAnd, nobody_, winners_->active(source));
+      }
+      noted += note_chain(candidates_[y], z, lacks_z, *with_y, silenced) ? 1 : 0;
+    }
+    return noted;
   }
 
   void index_inhibitions() {
@@ -321,8 +245,6 @@ class PortFindings {
         if (implied.inactive[i]) inhibited_by_[winners_->sources()[variable]].set(x);
       }
     }
-    for (const Candidate& each : candidates_)
-      keeps_out_.push_back(inhibited_by_[each.rule->source]);
   }
 
   // The x of chains x, y, z as far as single literals tell: x reads y, and neither do x or y
@@ -382,14 +304,12 @@ class PortFindings {
   const CompiledPort& port_;
   const ProvedStatements& statements_;  // that speak of the port
   Diagnostics& diagnostics_;
-  Budget* budget_ = nullptr;
   Winners* winners_ = nullptr;
   std::vector<Candidate> candidates_;  // connections that can win
   Diagram nobody_;
   std::unordered_map<std::string, Candidates> place_of_;      // by source: the candidate that it is
   std::unordered_map<std::string, Candidates> readers_of_;    // by source: whose rules read it
   std::unordered_map<std::string, Candidates> inhibited_by_;  // by source: that win only without it
-  std::vector<Candidates> keeps_out_;                         // of each candidate's source
 };
 
 }  // namespace

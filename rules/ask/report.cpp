@@ -13,7 +13,6 @@
 #include "rules/prove/winners.hpp"
 #include "rules/text/excerpt.hpp"
 #include "rules/text/names.hpp"
-#include "shm/utf8.hpp"
 
 namespace arbiter::rules {
 namespace {
@@ -117,8 +116,8 @@ std::optional<std::string> help_of(const Diagnostic& item) {
 }
 
 void write_item(std::ostream& out, const Diagnostic& item, Excerpts& excerpts) {
-  out << shm::printable(item.where.file) << ':' << item.where.line << ':' << item.where.column
-      << ": " << name_of(item.severity) << ": " << item.message << " [" << item.code << "]\n"
+  out << printable_place(item.where) << ": " << name_of(item.severity) << ": " << item.message
+      << " [" << item.code << "]\n"
       << excerpts.at(item.where);
   // A sentence that has all of it in words says it better.
   const bool is_told = item.witness && is_short(*item.witness) &&

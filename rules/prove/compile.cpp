@@ -157,6 +157,8 @@ void ModelCompiler::add_unarbitrated_ports() {
 void ModelCompiler::report_never_running() {
   constexpr int kMaxExplained = 100;  // each takes some diagrams
   int explained = 0;
+  // What only explains leaves the steps to what is asked later.
+  const Budget::Part part(context_.budget, context_.budget.left() / 10);
   for (std::size_t i = 0; i < rules_.behaviours.size(); ++i) {
     const auto& behaviour = rules_.behaviours[i];
     if (may_run_[i] || behaviour.rules.empty()) continue;

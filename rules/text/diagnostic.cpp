@@ -14,6 +14,11 @@ std::string describe(const Location& where) {
          ':' + std::to_string(where.column);
 }
 
+std::string printable_place(const Location& where) {
+  return shm::printable(where.file) + ':' + std::to_string(where.line) + ':' +
+         std::to_string(where.column);
+}
+
 std::string in_words(const Witness& witness) {
   if (witness.active.empty() && witness.inactive.empty()) return "nothing active";
   std::string text;

@@ -25,6 +25,9 @@ struct Location {
 // a semicolon in it stands in quotes.
 std::string describe(const Location& where);
 
+// The same, as a finding begins with it: without quotes, and fit for a terminal.
+std::string printable_place(const Location& where);
+
 enum class Severity { kError, kWarning, kNote };
 
 // An activation of sources that shows a finding: these are active, these are not, the others do not

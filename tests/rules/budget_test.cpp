@@ -147,6 +147,37 @@ TEST(Budget, AModelIsAcceptedWhateverElseIsAskedOfIt) {
   EXPECT_GE(budget.left(), 200'000u / 5 - 20'000u);
 }
 
+// One pigeon more than there are holes, and none shares its hole.
+ExpressionPtr too_many_pigeons(int holes) {
+  const auto sits = [&](int pigeon, int hole) { return name(pigeon * holes + hole); };
+  std::vector<ExpressionPtr> demands;
+  for (int pigeon = 0; pigeon <= holes; ++pigeon) {
+    std::vector<ExpressionPtr> somewhere;
+    for (int hole = 0; hole < holes; ++hole) {
+      somewhere.push_back(active(sits(pigeon, hole)));
+      for (int other = 0; other < pigeon; ++other) {
+        demands.push_back(any_of({inactive(sits(pigeon, hole)), inactive(sits(other, hole))}));
+      }
+    }
+    demands.push_back(any_of(std::move(somewhere)));
+  }
+  return all_of(std::move(demands));
+}
+
+TEST(Budget, WhatExplainsWhyABehaviourNeverRunsLeavesTheStepsToWhatIsAskedLater) {
+  RulesByHand by_hand;
+  for (int i = 0; i < 3; ++i) {
+    const std::string port = "/p" + std::to_string(i);
+    by_hand.port(port, {{"/x", too_many_pigeons(7)}});
+    by_hand.behaviour("Dead " + std::to_string(i), port, "/x", too_many_pigeons(7));
+  }
+  rules::Diagnostics diagnostics;
+  Budget budget(10'000'000);
+  compile(by_hand, diagnostics, budget);
+  EXPECT_FALSE(diagnostics.has_errors());
+  EXPECT_GE(budget.left(), 8'000'000u);
+}
+
 // Ten thousand statements about one port of 256 connections, in which all rules take part.
 TEST(Budget, StatementsAboutAPortShareItsDiagrams) {
   std::vector<std::pair<std::string, ExpressionPtr>> connections;
