@@ -28,7 +28,7 @@ using drawing::View;
 
 // All that Graphviz makes of it but dot, which is ours.
 constexpr std::array<std::string_view, 7> kFormats{"svg", "png", "dot", "pdf", "ps", "eps", "jpg"};
-constexpr int kLeastDpi = 20, kMostDpi = 1200;
+constexpr int kLeastDpi = 20, kUsualDpi = 96, kMostDpi = 1200;
 
 std::string format_of(const GraphOptions& options) {
   const auto is_known = [](const std::string& name) {
@@ -163,7 +163,9 @@ std::string Picture::lay_out(const std::string& text) const {
     if (interrupts_ != nullptr && sleep_until(0, *interrupts_)) throw PictureInterrupted();
     progress.show([&] {
       return "Graphviz lays the picture out, for " + std::to_string(progress.elapsed().count()) +
-             " s now; --port draws a part, --format dot does without it";
+             " s now; --port draws a part, " +
+             (page_.dpi > kUsualDpi ? "a smaller --dpi takes less, " : "") +
+             "--format dot does without it";
     });
   }};
   drawing::Layout layout = drawing::lay_out(text, format_, waiting);
