@@ -136,7 +136,6 @@ shm::FileDescriptor catch_signals() {
 }  // namespace
 
 Screen::Screen() : charset_(charset_of_locale()), signals_(catch_signals()) {
-  ::use_env(FALSE);  // curses would make room for all that the terminal says that it has
   if (::newterm(nullptr, stdout, stdin) == nullptr) {
     throw ScreenError("this terminal cannot be used; see `arbiter top --once`");
   }

@@ -24,7 +24,7 @@ class ScreenError : public std::runtime_error {
 };
 
 // Throws ScreenError unless standard input and output are a terminal that a screen can be drawn on.
-// Writes nothing.
+// Writes nothing. Called before there are threads, and before a Screen.
 void require_terminal();
 
 // What the user's locale (LC_CTYPE) can show, which the program takes over by this.

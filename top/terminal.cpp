@@ -26,6 +26,15 @@ std::string terminal_name() {
   return name == nullptr ? "" : name;
 }
 
+// The Linux console's description, for one, has no size, and curses fails without one. The
+// variables must be set before there are threads.
+void describe_size() {
+  if (::tigetnum("lines") > 0 && ::tigetnum("cols") > 0) return;
+  ::use_env(TRUE);
+  ::setenv("LINES", "24", 0);
+  ::setenv("COLUMNS", "80", 0);
+}
+
 }  // namespace
 
 void require_terminal() {
@@ -36,6 +45,7 @@ void require_terminal() {
     throw ScreenError(std::string("TERM is not set, which says what the terminal is") + kOnce);
   }
   const std::string what = "TERM is \"" + terminal_name() + "\", ";
+  ::use_env(FALSE);  // curses would make room for all that the terminal says that it has
   int error = 0;
   if (::setupterm(nullptr, STDOUT_FILENO, &error) != OK) {
     throw ScreenError(what + "of which there is no description" + kOnce);
@@ -43,6 +53,7 @@ void require_terminal() {
   char* const move = ::tigetstr("cup");
   // It is -1 where the terminal's description says that it is no string.
   const bool can_move = move != nullptr && reinterpret_cast<std::intptr_t>(move) != -1;
+  if (can_move) describe_size();
   ::del_curterm(::set_curterm(nullptr));
   if (!can_move) throw ScreenError(what + "a terminal that cannot move its cursor" + kOnce);
 }

@@ -112,6 +112,17 @@ TEST_F(TopTerminal, ShowsWideCharactersInTheirColumns) {
   EXPECT_EQ(column_of(" /腕:o"), column_of(" /low:o")) << top.text();
 }
 
+TEST_F(TopTerminal, MayBeOneWhoseDescriptionHasNoSize) {
+  const EmulatedTerminal::Size sizes[] = {{24, 80}, {40, 100}, {8, 30}, {400, 700}};
+  for (const auto& its : sizes) {
+    EmulatedTerminal top({kArbiter, "top"}, top_environment({{"TERM", "linux"}}), its);
+    ASSERT_TRUE(top.wait_for("INPUT PORT")) << top.text();
+    ASSERT_TRUE(top.wait_for("q quit")) << top.text();
+    top.type("q");
+    EXPECT_EQ(top.wait_for_end(), 0);
+  }
+}
+
 TEST(TopTerminalOf, SendsNothingThatANameSays) {
   TemporaryDirectory directory;
   const std::string model = directory.write("evil\x1b]0;mine\x07.xml", kTopModel);
