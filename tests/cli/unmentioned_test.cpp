@@ -67,8 +67,9 @@ TEST(Unmentioned, AChangeNamesInputPortsThatGetNothingFromNowOn) {
   auto in = node.input_port("/Gaze/pos:i");
   auto out = node.output_port("/other:o");
   EXPECT_THAT(arbiter({"reload"}).out, Not(HasSubstr("open")));
-  daemon.write_model("<behaviors><behavior name='A'><config at='/Arm/pos:i'>/a:o</config>"
-                     "</behavior></behaviors>");
+  daemon.write_model(
+      "<behaviors><behavior name='A'><config at='/Arm/pos:i'>/a:o</config>"
+      "</behavior></behaviors>");
   EXPECT_THAT(arbiter({"reload"}).out,
               HasSubstr("\n  open, but not mentioned by this model, so that no sample arrives: "
                         "/Gaze/pos:i\n"));
