@@ -71,6 +71,7 @@ const std::vector<std::string_view> silenceable{"behaviour-on-two-hosts",
                                                 "no-idle",
                                                 "no-owner",
                                                 "no-rule-at-port",
+                                                "no-taker",
                                                 "nobody-wins",
                                                 "not-arbitrated",
                                                 "not-at-one-instant",
@@ -180,6 +181,8 @@ void check_gateways(const CheckOptions& options, const rules::RuleSet* model,
           mappings, *model,
           rules::read_application(rules::TextFile(text.path, text.content), found_before),
           of_mappings);
+    } else if (model != nullptr) {
+      gateway::check_takers(mappings, *model, of_mappings);
     }
   }
   diagnostics.add(std::move(of_mappings));

@@ -123,4 +123,25 @@ void check_owners(const std::vector<Mapping>& mappings, const rules::RuleSet& mo
   OwnerCheck(mappings, application, diagnostics).check(model);
 }
 
+void check_takers(const std::vector<Mapping>& mappings, const rules::RuleSet& model,
+                  rules::Diagnostics& diagnostics) {
+  std::set<std::string> taken;
+  for (const Mapping& mapping : mappings) {
+    for (const Gateway& gateway : mapping.gateways) {
+      for (const Entry& entry : gateway.entries) {
+        if (!entry.is_in()) taken.insert(entry.port->name);
+      }
+    }
+  }
+  for (const rules::PortRules& port : model.ports) {
+    if (taken.contains(port.port)) continue;
+    diagnostics.note("no-taker", port.where,
+                     "no mapping takes what " + port.port +
+                         " gets: if no component opens it, nobody does; to send it on, add an "
+                         "<out port=\"" +
+                         port.port + "\" …/>",
+                     {.ports = {port.port}});
+  }
+}
+
 }  // namespace arbiter::gateway

@@ -17,4 +17,9 @@ namespace arbiter::gateway {
 void check_owners(const std::vector<Mapping>& mappings, const rules::RuleSet& model,
                   const rules::Application& application, rules::Diagnostics& diagnostics);
 
+// Where no application says which modules there are: a note of each input port of the model that no
+// entry takes from, since only a component can.
+void check_takers(const std::vector<Mapping>& mappings, const rules::RuleSet& model,
+                  rules::Diagnostics& diagnostics);
+
 }  // namespace arbiter::gateway

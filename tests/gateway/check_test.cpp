@@ -397,6 +397,21 @@ TEST(CheckOwners, APortThatNobodyHasIsFound) {
               HasSubstr("nobody publishes there; did you mean \"/Nav/cmmd:o\"?"));
 }
 
+// No application says whether a component has it.
+TEST(CheckTakers, AnInputPortThatNoEntryTakesFromIsNoted) {
+  rules::Diagnostics ignored;
+  rules::ModelTexts texts;
+  texts.models.push_back({"model.xml", kModel});
+  const rules::RuleSet rules = rules::load(std::move(texts), ignored);
+  Read without = read_text(dds(in("/nav", "/Nav/cmd:o")));
+  check_takers({without.mapping}, rules, without.diagnostics);
+  ASSERT_THAT(without.findings(), ElementsAre(HasSubstr("note no-taker")));
+  EXPECT_THAT(without.message(), HasSubstr("no mapping takes what /Base/cmd:i gets"));
+  Read with = read_text(dds(in("/nav", "/Nav/cmd:o") + out("/cmd", "/Base/cmd:i")));
+  check_takers({with.mapping}, rules, with.diagnostics);
+  EXPECT_THAT(with.findings(), IsEmpty());
+}
+
 TEST(CheckOwners, APortThatTwoHaveIsFound) {
   const std::string both = dds(in("/nav", "/Nav/cmd:o") + out("/cmd", "/Base/cmd:i"));
   const Read read = owners(both, module_called("/Nav"));
