@@ -54,7 +54,7 @@ class CircleSearch {
   Circle find_behind(std::size_t first) {
     std::vector<Circle> ways{{first}};
     for (std::size_t at = 0; at < ways.size(); ++at) {
-      const Circle way = ways[at];
+      Circle way = ways[at];
       budget_.spend(way.size() * all_.size());  // to look along it for each that may follow
       for (std::size_t next = first; next < all_.size(); ++next) {
         if (!all_[next][way.back()]) continue;
