@@ -80,7 +80,9 @@ class StreamSequence {
     require(stream_.note(from, event) == is_new, "the order never goes back, and nothing is twice");
     require(stream_.doubled() == doubled + (is_new ? 0 : 1), "what is twice is counted");
     const std::uint64_t skipped = is_new && has_begun_ ? event.number - exporter.last - 1 : 0;
-    require(has_sequences_ ? stream_.lost() - lost >= skipped : stream_.lost() - lost == skipped,
+    require(stream_.lost() >= lost, "a counter only grows");
+    const std::uint64_t counted = std::min(skipped, ~lost);  // it never begins again
+    require(has_sequences_ ? stream_.lost() - lost >= counted : stream_.lost() - lost == counted,
             "losses are the numbers that were skipped");
     if (!is_new) return;
     has_begun_ = has_begun_ || !event.is_unasked;
