@@ -275,6 +275,7 @@ TEST(Tap, OpenedByADaemonThatIsReplacedAtOnceIsKnownToTheNext) {
   ASSERT_TRUE(is_replaced);
   await([&] { return daemon.source("/out")["open"] == true; });
   auto last = node.input_port<Number>("/last");  // what the node has said before has been heard
+  await([&] { return daemon.taps_of("/out") != 0; });  // its publisher has answered
   EXPECT_EQ(daemon.taps_of("/out"), 1u);
 }
 
