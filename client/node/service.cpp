@@ -95,7 +95,8 @@ int NodeCore::look_again_in() const noexcept {
   return tidy < 0 ? description : std::min(tidy, description);
 }
 
-// Whoever waits for service_fd() does not know when that is. Alone, the timer has its own time.
+// Whoever waits for service_fd() does not know when that is. A ring that has come is taken back by
+// this. Alone, the timer has its own time.
 void NodeCore::ring_when_to_look_again() const {
   if (socket_ != nullptr) {
     ring_timer_every(std::chrono::milliseconds(std::max(0, look_again_in())));
@@ -125,11 +126,10 @@ void NodeCore::pump(int timeout_ms) {
     say_descriptions();
     if (!options_.service_thread) ring_when_to_look_again();
   }
-  std::uint64_t rings = 0;
-  const bool has_rung = ::read(timer_.get(), &rings, sizeof rings) > 0;
   const Socket socket = this->socket();
   if (socket == nullptr) {
-    if (has_rung) rejoin();
+    std::uint64_t rings = 0;
+    if (::read(timer_.get(), &rings, sizeof rings) > 0) rejoin();
     return;
   }
   wire::Received received;
