@@ -7,7 +7,6 @@
 
 #include "cli/why_answer.hpp"
 #include "cli/why_report.hpp"
-#include "shm/utf8.hpp"
 
 namespace arbiter::cli {
 namespace {
@@ -55,10 +54,7 @@ void WhyAnswer::write_selected(const ConnectionExplanation& connection) const {
     }
     out_ << "  selected by "
          << (part.behaviour ? describe(*part.behaviour) : std::string("its rule"));
-    if (!part.where.file.empty()) {
-      out_ << " (" << shm::printable(part.where.file) << ':' << part.where.line << ')';
-    }
-    out_ << '\n';
+    out_ << place_text(part.where) << '\n';
   }
 }
 

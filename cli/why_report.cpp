@@ -16,12 +16,6 @@ using nlohmann::json;
 
 constexpr std::size_t kMaxNamed = 4;
 
-std::string place(const rules::Location& where) {
-  return where.file.empty()
-             ? ""
-             : " (" + shm::printable(where.file) + ":" + std::to_string(where.line) + ")";
-}
-
 json place_json(const rules::Location& where) {
   if (where.file.empty()) return nullptr;
   return {{"file", where.file}, {"line", where.line}, {"column", where.column}};
@@ -62,7 +56,7 @@ std::string inhibition_text(const rules::Cause& cause, const Sources& sources) {
       (will_be ? "would be inhibited by " : "inhibited by ") + describe(*cause.inhibitor);
   if (cause.speaker) text += " (its behaviour \"" + cause.speaker->name + "\")";
   if (cause.of && cause.of->is_meta) text += " through " + describe(*cause.of);
-  text += place(cause.where) + ": ";
+  text += place_text(cause.where) + ": ";
   text += cause.own_activity == OwnActivity::kNoMatter
               ? literals_text(cause.because, sources)
               : std::string(will_be ? "once it is active, it is itself" : "it is itself") +
@@ -108,6 +102,12 @@ bool becomes_active(const SourceState& state, shm::Nanoseconds now) {
 }
 
 }  // namespace
+
+std::string place_text(const rules::Location& where) {
+  return where.file.empty()
+             ? ""
+             : " (" + shm::printable(where.file) + ":" + std::to_string(where.line) + ")";
+}
 
 std::string activity_text(const Sources& sources, const std::string& name) {
   const SourceState source = sources.state(name);
@@ -164,7 +164,7 @@ std::string cause_text(const rules::Cause& cause, const Sources& sources) {
   }
   const std::string whose = cause.of ? "the condition of " + describe(*cause.of) : "its condition";
   return whose + ", " + cause.condition + (will_be ? ", would be false" : ", is false") + itself +
-         place(cause.where) + ": " + because;
+         place_text(cause.where) + ": " + because;
 }
 
 json cause_json(const rules::Cause& cause) {
@@ -186,11 +186,11 @@ json cause_json(const rules::Cause& cause) {
 
 std::string headline(const rules::Cause& cause) {
   if (cause.kind == rules::Cause::Kind::kInhibited) {
-    return "inhibited by " + describe(*cause.inhibitor) + place(cause.where);
+    return "inhibited by " + describe(*cause.inhibitor) + place_text(cause.where);
   }
   if (cause.kind == rules::Cause::Kind::kUnwritten) return "kept out by their rules";
   const std::string whose = cause.of ? "the condition of " + describe(*cause.of) : "a condition";
-  return "kept out by " + whose + ", " + cause.condition + place(cause.where);
+  return "kept out by " + whose + ", " + cause.condition + place_text(cause.where);
 }
 
 std::string first_cause(const rules::ConnectionExplanation& connection, const Sources& sources) {
@@ -213,7 +213,7 @@ std::string loss_text(const rules::ConnectionExplanation& loser, const Sources& 
 void write_causes(std::ostream& out, const rules::ConnectionExplanation& connection,
                   const Sources& sources, std::size_t max_lines) {
   if (!connection.has_rule) {
-    out << "  no rule selects it, so it never delivers here" << place(connection.where)
+    out << "  no rule selects it, so it never delivers here" << place_text(connection.where)
         << (connection.is_read ? "; its activity counts for the rules that read it"
                                : "; nor does any rule read it")
         << '\n';
@@ -230,11 +230,12 @@ void write_causes(std::ostream& out, const rules::ConnectionExplanation& connect
     const std::string who = part.behaviour ? describe(*part.behaviour) : std::string("its rule");
     if (part.causes.empty()) {
       if (connection.is_active || connection.earlier) continue;
-      out << "  " << who << place(part.where) << " would select it, if it were active\n";
+      out << "  " << who << place_text(part.where) << " would select it, if it were active\n";
       continue;
     }
     const std::string indent = connection.parts.size() > 1 ? "    " : "  ";
-    if (connection.parts.size() > 1) out << "  as " << who << place(part.where) << " has it:\n";
+    if (connection.parts.size() > 1)
+      out << "  as " << who << place_text(part.where) << " has it:\n";
     const std::size_t told = std::min(part.causes.size(), max_lines);
     for (std::size_t i = 0; i < told; ++i) {
       out << indent << cause_text(part.causes[i], sources) << '\n';

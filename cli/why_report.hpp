@@ -24,6 +24,9 @@ using watch::span_text;
 std::string activity_text(const Sources& sources, const std::string& name);
 nlohmann::json activity_json(const Sources& sources, const std::string& name);
 
+// " (m.xml:9)"; nothing where that is not known.
+std::string place_text(const rules::Location& where);
+
 // In one line, without the name of the connection: "inhibited by …".
 std::string cause_text(const rules::Cause& cause, const Sources& sources);
 nlohmann::json cause_json(const rules::Cause& cause);
