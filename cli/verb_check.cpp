@@ -147,19 +147,6 @@ Statements judge_statements(const CheckOptions& options, const rules::CompiledMo
   return result;
 }
 
-std::set<std::string> published_by(const std::vector<gateway::Mapping>& mappings) {
-  std::set<std::string> sources;
-  for (const gateway::Mapping& mapping : mappings) {
-    for (const gateway::Gateway& gateway : mapping.gateways) {
-      for (const gateway::Entry& entry : gateway.entries) {
-        if (!entry.is_in()) continue;
-        for (const gateway::Port* port : entry.ports()) sources.insert(port->name);
-      }
-    }
-  }
-  return sources;
-}
-
 // As statements: they are read in any case, and judged by a model that can be run.
 void check_gateways(const CheckOptions& options, const rules::RuleSet* model,
                     rules::Diagnostics& diagnostics) {
@@ -170,7 +157,7 @@ void check_gateways(const CheckOptions& options, const rules::RuleSet* model,
     mappings.push_back(gateway::read_mapping_file(path, of_mappings));
   }
   if (!of_mappings.has_errors()) {
-    const std::set<std::string> published = published_by(mappings);
+    const std::set<std::string> published = gateway::ports_of(mappings, true);
     diagnostics.silence_about("never-published", published);
     diagnostics.silence_about("never-read", published);  // it is declared for its T
     gateway::check_mappings(mappings, model, of_mappings);

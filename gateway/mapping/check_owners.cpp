@@ -123,16 +123,22 @@ void check_owners(const std::vector<Mapping>& mappings, const rules::RuleSet& mo
   OwnerCheck(mappings, application, diagnostics).check(model);
 }
 
-void check_takers(const std::vector<Mapping>& mappings, const rules::RuleSet& model,
-                  rules::Diagnostics& diagnostics) {
-  std::set<std::string> taken;
+std::set<std::string> ports_of(const std::vector<Mapping>& mappings, bool is_in) {
+  std::set<std::string> ports;
   for (const Mapping& mapping : mappings) {
     for (const Gateway& gateway : mapping.gateways) {
       for (const Entry& entry : gateway.entries) {
-        if (!entry.is_in()) taken.insert(entry.port->name);
+        if (entry.is_in() != is_in) continue;
+        for (const Port* port : entry.ports()) ports.insert(port->name);
       }
     }
   }
+  return ports;
+}
+
+void check_takers(const std::vector<Mapping>& mappings, const rules::RuleSet& model,
+                  rules::Diagnostics& diagnostics) {
+  const std::set<std::string> taken = ports_of(mappings, false);
   for (const rules::PortRules& port : model.ports) {
     if (taken.contains(port.port)) continue;
     diagnostics.note("no-taker", port.where,

@@ -2,6 +2,8 @@
 // or one entry of a mapping has each.
 #pragma once
 
+#include <set>
+#include <string>
 #include <vector>
 
 #include "gateway/mapping/mapping.hpp"
@@ -16,6 +18,9 @@ namespace arbiter::gateway {
 // that gateway.
 void check_owners(const std::vector<Mapping>& mappings, const rules::RuleSet& model,
                   const rules::Application& application, rules::Diagnostics& diagnostics);
+
+// The ports that the entries feed (`is_in`), or those that they take from.
+[[nodiscard]] std::set<std::string> ports_of(const std::vector<Mapping>& mappings, bool is_in);
 
 // Where no application says which modules there are: a note of each input port of the model that no
 // entry takes from, since only a component can.

@@ -36,12 +36,12 @@ namespace arbiter::gateway {
 [[nodiscard]] std::optional<Field> field_of(std::string_view ros_type);
 // Common ones that begin with a std_msgs/msg/Header: with a time, and the name of a frame.
 [[nodiscard]] bool has_header(std::string_view ros_type);
-inline constexpr std::size_t kLeastHeader = 13;  // bytes, if that name is empty
-// Of one that is a header and fields of one size, such as TwistStamped: how
-// many bytes it has if its frame's name is empty.
-[[nodiscard]] std::optional<std::size_t> size_without_frame(std::string_view ros_type);
-// Where that name's length is, which counts its final zero.
+// Where that name's length is, four bytes; it counts the final zero.
 inline constexpr std::size_t kFrameLengthOffset = 8;
+inline constexpr std::size_t kLeastHeader = kFrameLengthOffset + 4 + 1;  // an empty name's
+// Of one that is a header and fields of one size, such as TwistStamped: how many bytes it has if
+// its frame's name is empty.
+[[nodiscard]] std::optional<std::size_t> size_without_frame(std::string_view ros_type);
 // Common ones of which zero bytes are no sample, since they contain a string.
 [[nodiscard]] bool has_strings(std::string_view ros_type);
 
