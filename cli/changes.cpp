@@ -124,13 +124,15 @@ wire::ChangeReport ask_for_change(const std::string& verb, const std::string& in
   return report;
 }
 
-int write_result(const wire::ChangeReport& report, const std::string& verb,
-                 const std::string& instance, bool json) {
-  if (report.ok && !json) {
+int change_model(const std::string& verb, const std::string& instance,
+                 const wire::Message& question, bool json) {
+  const auto report = ask_for_change(verb, instance, question, json);
+  if (!report.ok) return 1;
+  if (!json) {
     write_in_force(report);
     if (report.generation.value_or(0) != 0) write_unmentioned(verb, instance);
   }
-  return report.ok ? 0 : 1;
+  return 0;
 }
 
 }  // namespace arbiter::cli

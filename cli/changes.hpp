@@ -14,9 +14,9 @@ namespace arbiter::cli {
 wire::ChangeReport ask_for_change(const std::string& verb, const std::string& instance,
                                   wire::Message question, bool json);
 
-// Unless `json`: "model 5 is in force", what that changes, and which open ports it does not
-// mention. Gives the verb's exit code.
-int write_result(const wire::ChangeReport& report, const std::string& verb,
-                 const std::string& instance, bool json);
+// Asks for it, and says, unless `json`: "model 5 is in force", what that changes, and which open
+// ports it does not mention. Gives the verb's exit code. Throws as ask_for_change().
+int change_model(const std::string& verb, const std::string& instance,
+                 const wire::Message& question, bool json);
 
 }  // namespace arbiter::cli

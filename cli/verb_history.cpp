@@ -60,8 +60,7 @@ int rollback(const RollbackOptions& options) {
   wire::Message question;
   question.kind = wire::MessageKind::kRollback;
   question.link = options.generation;
-  return write_result(ask_for_change("rollback", options.instance, question, options.json),
-                      "rollback", options.instance, options.json);
+  return change_model("rollback", options.instance, question, options.json);
 }
 
 }  // namespace

@@ -31,10 +31,9 @@ int reload(const ReloadOptions& options) {
   wire::Message question;
   question.kind = wire::MessageKind::kReload;
   question.flags = options.dry_run ? wire::kDryRun : 0u;
+  if (!options.dry_run) return change_model("reload", options.instance, question, options.json);
   const auto report = ask_for_change("reload", options.instance, question, options.json);
-  if (!options.dry_run || options.json || !report.ok) {
-    return write_result(report, "reload", options.instance, options.json);
-  }
+  if (options.json || !report.ok) return report.ok ? 0 : 1;
   const auto models = report.models.value_or(std::vector<wire::ModelComparison>());
   for (const auto& model : models) write_changes(model, models.size() == 1);
   if (report.policy && report.policy->differs) {

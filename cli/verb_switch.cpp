@@ -94,8 +94,7 @@ int switch_model(const SwitchOptions& options) {
   wire::Message question;
   question.kind = wire::MessageKind::kSwitch;
   question.set_name(options.model);
-  return write_result(ask_for_change("switch", options.instance, question, options.json), "switch",
-                      options.instance, options.json);
+  return change_model("switch", options.instance, question, options.json);
 }
 
 }  // namespace
