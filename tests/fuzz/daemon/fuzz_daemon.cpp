@@ -6,19 +6,15 @@
 //   - no crash, no undefined behaviour; the daemon's loop rests when there is nothing to do
 //   - those who keep to the protocol are served in time, and keep their ports and each other
 //   - once the hostile ones are gone, no client, port or descriptor of theirs is left
-#include <fcntl.h>
-#include <sys/epoll.h>
-#include <sys/eventfd.h>
 #include <sys/socket.h>
-#include <sys/stat.h>
-#include <unistd.h>
 
-#include <algorithm>
-#include <array>
-#include <optional>
+#include <cstring>
+#include <memory>
+#include <string>
 #include <utility>
 #include <vector>
 
+#include "tests/fuzz/daemon/descriptors.hpp"
 #include "tests/fuzz/daemon/stage.hpp"
 #include "tests/fuzz/fuzz.hpp"
 #include "tests/fuzz/script.hpp"
@@ -64,6 +60,10 @@ struct Hostile {
   std::vector<std::pair<wire::Message, std::vector<int>>> said;
   std::vector<shm::PortInstance> ports;
   std::vector<std::uint64_t> numbers;  // of nodes, links and barriers
+
+  [[nodiscard]] Descriptors::Owner own() const {
+    return {process.identity().process, connection->socket()};
+  }
 };
 
 class Run {
@@ -74,8 +74,7 @@ class Run {
     for (int step = 0; step < kMostSteps && !script_.is_at_end(); ++step) act();
     for (Hostile& each : hostile_) leave(each);
     hostile_.clear();
-    given_.clear();
-    made_.clear();
+    descriptors_.close();
     stage_.run(1'000'000'000);
     stage_.require_as_before();
   }
@@ -144,11 +143,7 @@ class Run {
   // What they have made themselves is of the user who sends it first.
   void declare_makers(const Hostile& who, const std::vector<int>& descriptors) {
     for (const int fd : descriptors) {
-      const bool is_made = std::any_of(made_.begin(), made_.end(),
-                                       [fd](const auto& made) { return made.get() == fd; });
-      if (is_made || fd == bell_.write_end().get()) {
-        Loop::declare_maker(fd, who.process.identity().user);
-      }
+      if (descriptors_.is_made(fd)) Loop::declare_maker(fd, who.process.identity().user);
     }
   }
 
@@ -163,10 +158,10 @@ class Run {
     std::vector<int> descriptors;
     if ((message.flags & wire::kRejoins) != 0) {
       message.link = one_of(hostile->numbers);
-      descriptors = {given(0), given(1)};
+      descriptors = {descriptors_.given(0), descriptors_.given(1)};
     } else if (script_.byte() % 2 == 0) {  // it has nothing left of what it was
       message.link = one_of(hostile->numbers);
-      descriptors = {given(0)};
+      descriptors = {descriptors_.given(0)};
     }
     say(*hostile, message, descriptors);
     stage_.run();
@@ -183,9 +178,10 @@ class Run {
     message.flags = how >= 240 ? wire::kYields : 0u;
     std::vector<int> descriptors;
     if (kind == MessageKind::kOpenOutput) {
-      descriptors = {make(make_output_segment(message.type, 1 + script_.byte() % 8u))};
+      descriptors = {descriptors_.make(make_output_segment(message.type, 1 + script_.byte() % 8u))};
     } else {
-      descriptors = {make(make_input_segment(1 + script_.byte() % 8u)), bell_.write_end().get()};
+      descriptors = {descriptors_.make(make_input_segment(1 + script_.byte() % 8u)),
+                     descriptors_.bell()};
     }
     say(*hostile, message, descriptors);
   }
@@ -224,7 +220,7 @@ class Run {
     Hostile* const hostile = who();
     if (hostile == nullptr) return;
     const wire::Message message = anything(*hostile);
-    say(*hostile, message, descriptors(*hostile));
+    say(*hostile, message, descriptors_.some(hostile->own()));
   }
 
   // A message cut off, too long, or altered at some place.
@@ -238,7 +234,7 @@ class Run {
       bytes[script_.word() % bytes.size()] = script_.byte();
     }
     const std::size_t size = script_.word() % bytes.size();
-    const std::vector<int> with = descriptors(*hostile);
+    const std::vector<int> with = descriptors_.some(hostile->own());
     declare_makers(*hostile, with);
     hostile->connection->send_bytes(bytes.data(), size, with);
   }
@@ -299,8 +295,8 @@ class Run {
         synced.request = message.request;
         if (answers) hostile->connection->send(synced);
       }
-      for (std::size_t i = 0; i < received.descriptor_count && given_.size() < 64; ++i) {
-        given_.push_back(std::move(received.descriptors[i]));
+      for (std::size_t i = 0; i < received.descriptor_count; ++i) {
+        descriptors_.keep(std::move(received.descriptors[i]));
       }
     }
   }
@@ -315,100 +311,10 @@ class Run {
   std::uint64_t one_of(const std::vector<std::uint64_t>& numbers) {
     return numbers.empty() ? script_.number() : numbers[script_.byte() % numbers.size()];
   }
-  int given(std::size_t index) { return given_.empty() ? -1 : given_[index % given_.size()].get(); }
-
-  int make(shm::FileDescriptor descriptor) {
-    made_.push_back(std::move(descriptor));
-    return made_.back().get();
-  }
-
-  std::vector<int> descriptors(const Hostile& hostile) {
-    std::size_t count = script_.byte() % 4;
-    if (count == 3) count = script_.byte() % 40u;
-    std::vector<int> result;
-    while (result.size() < count) {
-      const int one = descriptor(hostile);
-      if (one < 0) return {};
-      result.push_back(one);
-    }
-    return result;
-  }
-  int descriptor(const Hostile& hostile) {
-    const std::uint8_t kind = script_.byte();
-    // Those that came later have bytes of their own, so that the corpus still means what it did.
-    switch (kind >= 252 ? 14 + kind % 3 : kind % 18 > 13 ? 17 : kind % 18) {
-      case 0:
-        return make(make_output_segment({}, 1 + script_.byte() % 8u));
-      case 1:
-        return make(make_input_segment(1 + script_.byte() % 8u));
-      case 2:
-        return make(make_output_segment(1 + script_.byte() % 8u, script_.byte(), script_.number()));
-      case 3:
-        return make(make_input_segment(script_.byte(), script_.number()));
-      case 4:
-        return bell_.write_end().get();
-      case 5:
-        return bell_.read_end();
-      case 6:
-        return hostile.process.identity().process;  // an end of a pipe
-      case 7:
-        return hostile.connection->socket();
-      case 8:
-        return make(shm::FileDescriptor(::open("/dev/zero", O_RDWR | O_CLOEXEC)));
-      case 9:
-        return make(shm::FileDescriptor(::open("/", O_RDONLY | O_DIRECTORY | O_CLOEXEC)));
-      case 10:
-        return make(shm::FileDescriptor(::open("/", O_PATH | O_CLOEXEC)));
-      case 11:
-        return make(shm::FileDescriptor(::epoll_create1(EPOLL_CLOEXEC)));
-      case 12:
-        return make(shm::make_segment("fuzz", script_.word() % (1u << 24)));
-      case 13: {
-        auto segment = shm::make_segment("fuzz", script_.number() % (1u << 24));
-        shm::seal(segment,
-                  script_.byte() % 2 == 0 ? shm::Seals::kFixedSize : shm::Seals::kOneWriter);
-        return make(std::move(segment));
-      }
-      case 14:
-        return make(fifo(kind));
-      case 15: {
-        int ends[2];
-        if (::pipe2(ends, O_CLOEXEC) != 0) return -1;
-        make(shm::FileDescriptor(ends[0]));
-        return make(shm::FileDescriptor(ends[1]));
-      }
-      case 16:
-        return make(queued(hostile));
-      default:
-        return given_.empty() ? -1 : given_[script_.byte() % given_.size()].get();
-    }
-  }
-
-  // A pipe with a name, by which a daemon of root might open it for others.
-  shm::FileDescriptor fifo(std::uint8_t kind) {
-    const std::string path = names_.path() + "/pipe:[1]";
-    static_cast<void>(::mkfifo(path.c_str(), 0600));
-    const int flags = kind % 2 == 0 ? O_PATH : O_RDWR;
-    return shm::FileDescriptor(::open(path.c_str(), flags | O_CLOEXEC));
-  }
-  // A socket with another in a message that nobody reads.
-  shm::FileDescriptor queued(const Hostile& hostile) {
-    int ends[2];
-    if (::socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0, ends) != 0) return {};
-    shm::FileDescriptor inner(ends[0]);
-    const shm::FileDescriptor outer(ends[1]);
-    static_cast<void>(
-        wire::send_message(outer.get(), {}, {hostile.process.identity().process, -1}));
-    return inner;
-  }
-
   Script& script_;
-  const test::TemporaryDirectory names_;
-  const shm::Bell bell_;
-  Stage stage_;
+  Descriptors descriptors_{script_};
+  Stage stage_;  // counts descriptors when it begins
   std::vector<Hostile> hostile_;
-  std::vector<shm::FileDescriptor> given_;  // by the daemon, to any of them
-  std::vector<shm::FileDescriptor> made_;
 };
 
 }  // namespace
