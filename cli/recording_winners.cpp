@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <iostream>
+#include <iterator>
 #include <map>
 #include <memory>
 #include <optional>
@@ -17,6 +18,7 @@
 
 #include "cli/live.hpp"
 #include "cli/port_patterns.hpp"
+#include "cli/recorded_components.hpp"
 #include "cli/recording_times.hpp"
 #include "cli/simulate_recording.hpp"
 #include "evidence/recorded.hpp"
@@ -37,15 +39,6 @@ struct RecordedWinners {
   std::string port;  // a pattern; empty: all
   std::string at;
   bool json = false;
-};
-
-// From a change to the next, or to the end of the run.
-struct Reign {
-  evidence::WinnerChange change;
-  shm::Nanoseconds end = 0;
-  bool is_cut_off = false;  // by the end of the run: how long it went on is not known
-  bool is_of_last_run = false;
-  const evidence::Run* run = nullptr;
 };
 
 // Nothing is recorded of a port that is idle when recording begins: what comes first says that it
@@ -90,124 +83,6 @@ std::vector<Reign> reigns_of(const Recorded& recorded, const std::string& patter
   return all;
 }
 
-// More components of one winner are counted: a recording may tell of ever new ones.
-constexpr std::size_t kMostComponents = 8;
-
-// Who published what won.
-struct Publishers {
-  std::vector<const evidence::PortChange*> first;
-  std::size_t others = 0;
-};
-
-// A component has an output port open. It is seen a little later than it happens.
-struct Ownership {
-  const evidence::PortChange* opening = nullptr;
-  shm::Nanoseconds since = 0;
-  shm::Nanoseconds until = shm::kForever;  // none before goes on for longer
-};
-
-// Who had a source open.
-class Owners {
- public:
-  Owners() = default;
-  explicit Owners(const std::vector<evidence::PortChange>& changes);
-
-  // A source may win after its component has gone.
-  [[nodiscard]] Publishers of(const Reign& reign) const;
-  // Of what was seen by then, what was recorded last; null: nothing.
-  [[nodiscard]] const evidence::PortChange* last_by(shm::Nanoseconds time) const;
-
- private:
-  const evidence::PortChange* changes_ = nullptr;
-  std::vector<shm::Nanoseconds> seen_;  // each of them, or one behind it: the earliest
-  std::vector<Ownership> all_;          // `since` and `until` do not fall
-};
-
-// One component has it open at a time. Looks come one after the other, but the deaths that one of
-// them shows come with the latest first.
-Owners::Owners(const std::vector<evidence::PortChange>& changes) : changes_(changes.data()) {
-  using What = evidence::PortChange::What;
-  std::size_t open = 0;  // behind the one that is open; 0: none is
-  shm::Nanoseconds now = 0;
-  for (const evidence::PortChange& each : changes) {
-    now = std::max(now, each.seen);
-    const bool is_opening = each.what == What::open || each.what == What::opened;
-    const bool ends_open = open != 0 && (is_opening || all_[open - 1].opening->pid == each.pid);
-    if (ends_open) {
-      all_[open - 1].until = now;
-      open = 0;
-    }
-    if (is_opening) open = all_.size() + 1;
-    // One that nobody saw open may have died all the same.
-    if (is_opening || (!ends_open && each.what == What::died)) {
-      all_.push_back({&each, now, is_opening ? shm::kForever : now});
-    }
-    seen_.push_back(each.seen);
-  }
-  for (std::size_t i = 1; i < all_.size(); ++i) {
-    all_[i].until = std::max(all_[i].until, all_[i - 1].until);
-  }
-  for (std::size_t i = seen_.size(); i-- > 1;) seen_[i - 1] = std::min(seen_[i - 1], seen_[i]);
-}
-
-Publishers Owners::of(const Reign& reign) const {
-  const evidence::WinnerChange& change = reign.change;
-  const bool begins_itself =
-      change.why == evidence::WinnerChange::Why::arrival && change.by == change.winner;
-  const auto first_from = [&](shm::Nanoseconds Ownership::*field, shm::Nanoseconds time) {
-    const auto is_before = [&](const Ownership& one) { return one.*field < time; };
-    return static_cast<std::size_t>(std::partition_point(all_.begin(), all_.end(), is_before) -
-                                    all_.begin());
-  };
-  const std::size_t first = first_from(&Ownership::until, change.time + 1);
-  std::size_t next = first_from(&Ownership::since, change.time + 1);
-  const std::size_t end = first_from(&Ownership::since, reign.end);
-  const bool has_first = first < all_.size() && (first < end || begins_itself);
-  Publishers found;
-  if (first != 0 && (!has_first || (first >= next && !begins_itself))) {
-    found.first.push_back(all_[first - 1].opening);
-  }
-  if (has_first) found.first.push_back(all_[first].opening);
-  for (next = std::max(next, first + 1); next < end; ++next) {
-    if (found.first.size() == kMostComponents) {
-      found.others = end - next;
-      break;
-    }
-    found.first.push_back(all_[next].opening);
-  }
-  return found;
-}
-
-const evidence::PortChange* Owners::last_by(shm::Nanoseconds time) const {
-  const auto behind = std::upper_bound(seen_.begin(), seen_.end(), time) - seen_.begin();
-  return behind == 0 ? nullptr : changes_ + behind - 1;
-}
-
-// Those of each source, found out once for all that it won.
-class Components {
- public:
-  const Owners& of(const evidence::Run& run, const std::string& source) {
-    const auto [known, is_new] = known_.try_emplace({&run, source});
-    const auto changes = run.output_changes.find(source);
-    if (is_new && changes != run.output_changes.end()) known->second = Owners(changes->second);
-    return known->second;
-  }
-  [[nodiscard]] Publishers of(const Reign& reign) {
-    return of(*reign.run, reign.change.winner).of(reign);
-  }
-  // Who had the source open that went inactive, and died; null: nobody did.
-  [[nodiscard]] const evidence::PortChange* death_behind(const Reign& reign) {
-    const evidence::WinnerChange& change = reign.change;
-    if (change.why != evidence::WinnerChange::Why::expiry) return nullptr;
-    const evidence::PortChange* last = of(*reign.run, change.by).last_by(change.time);
-    const bool has_died = last != nullptr && last->what == evidence::PortChange::What::died;
-    return has_died ? last : nullptr;
-  }
-
- private:
-  std::map<std::pair<const evidence::Run*, std::string>, Owners> known_;
-};
-
 // No component and no host has a longer one, and it is told wherever its source wins.
 void cut_names(Recorded& recorded) {
   for (evidence::Run& run : recorded.runs) {
@@ -242,6 +117,38 @@ ordered_json components_json(const Publishers& publishers) {
   }
   return list;
 }
+
+// In which something of a source was missed.
+class Gaps {
+ public:
+  explicit Gaps(const Recorded& recorded) {
+    for (const evidence::Run& run : recorded.runs) {
+      for (const evidence::Missed& gap : run.gaps) {
+        shm::Nanoseconds& end = all_[{&run, gap.source}][gap.from];
+        end = std::max(end, gap.to);
+      }
+    }
+    for (auto& [source, gaps] : all_) {  // each ends when one before it does, if that is later
+      shm::Nanoseconds last = 0;
+      for (auto& [from, end] : gaps) last = end = std::max(end, last);
+    }
+  }
+  // A source went inactive in one of its gaps: it may have arrived.
+  [[nodiscard]] bool has(const Reign& reign) const {
+    const evidence::WinnerChange& change = reign.change;
+    if (change.why != evidence::WinnerChange::Why::expiry) return false;
+    const auto gaps = all_.find({reign.run, change.by});
+    if (gaps == all_.end()) return false;
+    const auto behind = gaps->second.upper_bound(change.time);
+    return behind != gaps->second.begin() && std::prev(behind)->second >= change.time;
+  }
+
+ private:
+  // From when to when.
+  std::map<std::pair<const evidence::Run*, std::string>,
+           std::map<shm::Nanoseconds, shm::Nanoseconds>>
+      all_;
+};
 
 std::string death_text(const Reign& reign, const evidence::PortChange* death) {
   if (death == nullptr) return "";
@@ -306,7 +213,8 @@ void warn_of_pattern_without_match(const Recorded& recorded, const std::string& 
 }
 
 // One by one: each may be much longer than what was recorded of it.
-void write_reigns_json(const std::vector<Reign>& reigns, shm::Nanoseconds offset) {
+void write_reigns_json(const std::vector<Reign>& reigns, const Gaps& gaps,
+                       shm::Nanoseconds offset) {
   Components components;
   const char* before = "[\n  ";
   for (const Reign& reign : reigns) {
@@ -322,6 +230,7 @@ void write_reigns_json(const std::vector<Reign>& reigns, shm::Nanoseconds offset
         {"components", components_json(publishers)},
         {"why", evidence::name_of(change.why)},
         {"by", change.by},
+        {"is_in_gap", gaps.has(reign)},
         {"died", death_json(components.death_behind(reign))},
         {"generation", change.generation}};
     if (publishers.others != 0) one["other_components"] = publishers.others;
@@ -335,21 +244,43 @@ void write_reigns_json(const std::vector<Reign>& reigns, shm::Nanoseconds offset
   std::cout << (reigns.empty() ? "[]\n" : "\n]\n");
 }
 
-void write_reigns(const std::vector<Reign>& reigns, shm::Nanoseconds offset) {
+void write_reigns(const std::vector<Reign>& reigns, const Gaps& gaps, shm::Nanoseconds offset) {
   Components components;
   for (const Reign& reign : reigns) {
     const evidence::WinnerChange& change = reign.change;
     std::cout << clock_text(change.time + offset) << "  " << shm::printable(change.port) << "  "
               << (change.winner.empty() ? "idle" : shm::printable(change.winner))
               << components_text(components.of(reign)) << "  " << length_text(reign) << ": "
-              << cause_text(change) << death_text(reign, components.death_behind(reign)) << '\n';
+              << cause_text(change)
+              << (gaps.has(reign) ? ", unless it arrived in what was missed" : "")
+              << death_text(reign, components.death_behind(reign)) << '\n';
   }
 }
 
+// When it was, so that it can be told whether it matters.
+void warn_of_gaps(const Recorded& recorded) {
+  using evidence::Missed;
+  std::vector<Missed> gaps;
+  for (const evidence::Run& run : recorded.runs) {
+    gaps.insert(gaps.end(), run.gaps.begin(), run.gaps.end());
+  }
+  if (gaps.empty()) return warn_of_missed(recorded);
+  const auto first = std::min_element(
+      gaps.begin(), gaps.end(),
+      [](const Missed& one, const Missed& other) { return one.from < other.from; });
+  const auto last =
+      std::max_element(gaps.begin(), gaps.end(),
+                       [](const Missed& one, const Missed& other) { return one.to < other.to; });
+  const shm::Nanoseconds offset = recorded.about.wall_offset;
+  std::cerr << "arbiter: the recorder missed " << evidence::missed_text(recorded)
+            << ": who commanded is uncertain in " << rules::counted(gaps.size(), "gap") << ", "
+            << clock_text(first->from + offset) << " to " << clock_text(last->to + offset) << '\n';
+}
+
 int show_winners(const RecordedWinners& options) {
-  Recorded recorded = load_for_simulation(options.file);
+  Recorded recorded = load_for_simulation(options.file, evidence::Wanted::winners);
   cut_names(recorded);
-  warn_of_missed(recorded);
+  warn_of_gaps(recorded);
   if (!options.port.empty()) warn_of_pattern_without_match(recorded, options.port);
   std::vector<Reign> reigns = reigns_of(recorded, options.port);
   if (!options.at.empty()) {
@@ -360,10 +291,11 @@ int show_winners(const RecordedWinners& options) {
     });
   }
   const shm::Nanoseconds offset = recorded.about.wall_offset;
+  const Gaps gaps(recorded);
   if (options.json) {
-    write_reigns_json(reigns, offset);
+    write_reigns_json(reigns, gaps, offset);
   } else {
-    write_reigns(reigns, offset);
+    write_reigns(reigns, gaps, offset);
     if (reigns.empty()) std::cout << nobody_text(options);
   }
   return 0;
@@ -383,7 +315,7 @@ void add_recorded_winners(CLI::App& parent, int& exit_code) {
       ->type_name("PATTERN");
   verb->add_flag("--json", options->json,
                  "A list of {from, from_ns, to_ns, cut_off, port, winner, components, why, by, "
-                 "died, generation}");
+                 "is_in_gap, died, generation}");
   verb->footer(
       "Example:\n  arbiter recording winners incident.mcap --at 14:03:07\n\n"
       "Exit codes: 0 shown; 1 a file that `arbiter record` has not made; 2 wrong use, a time that "

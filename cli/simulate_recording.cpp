@@ -262,9 +262,9 @@ auto take_again(const Take& take) {
 
 }  // namespace
 
-Recorded load_for_simulation(const std::string& path) {
+Recorded load_for_simulation(const std::string& path, evidence::Wanted wanted) {
   ProgressLine line;
-  Recorded recorded = evidence::load_recording(path, line.watch("reading the recording"));
+  Recorded recorded = evidence::load_recording(path, line.watch("reading the recording"), wanted);
   line.clear();
   if (!recorded.about.end.is_whole) {
     std::cerr << "arbiter: " << shm::printable(path) << ": "

@@ -18,7 +18,8 @@ struct SimulateRecordingOptions {
 };
 
 // Says on standard error where it is not whole. Throws McapError, RecordError.
-evidence::Recorded load_for_simulation(const std::string& path);
+evidence::Recorded load_for_simulation(const std::string& path,
+                                       evidence::Wanted wanted = evidence::Wanted::all);
 
 // Says on standard error what the recorder missed, if it missed anything.
 void warn_of_missed(const evidence::Recorded& recorded);

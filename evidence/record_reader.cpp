@@ -14,7 +14,7 @@ namespace {
 class Reading {
  public:
   Reading(const std::string& path, Payloads payloads, const std::function<void(Record&&)>& use)
-      : path_(path), reads_payloads_(payloads == Payloads::read), use_(use) {}
+      : path_(path), payloads_(payloads), use_(use) {}
 
   ReadRecording run(const recording::Watch& watch) {
     recording::McapVisitor visitor;
@@ -27,6 +27,7 @@ class Reading {
       take(name, map);
     };
     result_.end = recording::read_mcap(path_, visitor);
+    hand_on_passed();
     hand_on();
     if (!has_metadata_) refuse();
     return std::move(result_);
@@ -93,21 +94,38 @@ class Reading {
     }
     const auto kind = kinds_.find(message.channel);
     if (kind == kinds_.end()) return;
-    hand_on();
-    const auto* text = reinterpret_cast<const char*>(message.data.data());
-    try {
-      waiting_ = read_record(kind->second, {text, message.data.size()}, contexts_);
-    } catch (const RecordError& error) {
-      throw RecordError(path_ + ": record " + std::to_string(result_.records + 1) + ", of topic " +
-                        std::string(record_schemas[static_cast<std::size_t>(kind->second)].topic) +
-                        ": " + error.what());
-    }
+    const std::string_view text(reinterpret_cast<const char*>(message.data.data()),
+                                message.data.size());
+    const bool is_event =
+        kind->second == RecordKind::kArrival || kind->second == RecordKind::kDeactivation;
     ++result_.records;
+    if (is_event && payloads_ == Payloads::pass_over_with_events) {
+      passed_kind_ = kind->second;
+      passed_ = text;
+      return;
+    }
+    hand_on_passed();
+    read(kind->second, text);
+  }
+
+  void read(RecordKind kind, std::string_view text) {
+    hand_on();
+    try {
+      waiting_ = read_record(kind, text, contexts_);
+    } catch (const RecordError& error) {
+      throw RecordError(path_ + ": record " + std::to_string(result_.records) + ", of topic " +
+                        std::string(record_schemas[static_cast<std::size_t>(kind)].topic) + ": " +
+                        error.what());
+    }
+  }
+
+  void hand_on_passed() {
+    if (!passed_.empty()) read(passed_kind_, std::exchange(passed_, ""));
   }
 
   // It stands directly behind its arrival.
   void take_payload(const std::string& source, const recording::McapMessage& message) {
-    if (!reads_payloads_ || !waiting_) return;
+    if (payloads_ != Payloads::read || !waiting_) return;
     auto* arrival = std::get_if<Arrival>(&*waiting_);
     if (arrival == nullptr || arrival->context->source != source ||
         static_cast<std::uint32_t>(arrival->sequence) != message.sequence) {
@@ -124,7 +142,7 @@ class Reading {
   }
 
   const std::string& path_;
-  const bool reads_payloads_;
+  const Payloads payloads_;
   const std::function<void(Record&&)>& use_;
   ReadRecording result_;
   bool has_metadata_ = false;
@@ -132,6 +150,8 @@ class Reading {
   std::map<std::uint16_t, std::string> payloads_of_;
   Contexts contexts_;
   std::optional<Record> waiting_;
+  RecordKind passed_kind_{};
+  std::string passed_;  // the last event that was passed over; empty: none
 };
 
 }  // namespace

@@ -28,7 +28,9 @@ struct ReadRecording {
   recording::McapEnd end;  // a file that was cut short is read up to its last whole chunk
 };
 
-enum class Payloads : std::uint8_t { pass_over, read };
+// pass_over_with_events: of arrivals and deactivations that stand one behind another, only the last
+// is handed on, which tells how far the recording goes.
+enum class Payloads : std::uint8_t { pass_over, read, pass_over_with_events };
 
 // Calls `use` for each record, in the file's order, which for those of one source is the order in
 // which they happened. Throws McapError, RecordError.

@@ -129,6 +129,7 @@ class Loader {
   // Of what was overtaken a state says where it goes on.
   void add(Missed&& each) {
     run().lost_samples += each.samples;
+    if (each.events != 0 && each.from != 0) run().gaps.push_back(each);
     if (each.why != Missed::Why::refused) return;
     Nanoseconds& from = run().sources[each.source].unknown_from;
     from = std::min(from, each.from);
@@ -156,11 +157,13 @@ std::string missed_text(const Recorded& recorded) {
   return missed_text(events, samples);
 }
 
-Recorded load_recording(const std::string& path, const recording::Watch& watch) {
+Recorded load_recording(const std::string& path, const recording::Watch& watch, Wanted wanted) {
   Recorded recorded;
   Loader loader;
   const auto use = [&](Record&& record) { loader.take(std::move(record)); };
-  recorded.about = read_recording(path, Payloads::pass_over, use, watch);
+  const auto payloads =
+      wanted == Wanted::winners ? Payloads::pass_over_with_events : Payloads::pass_over;
+  recorded.about = read_recording(path, payloads, use, watch);
   recorded.runs = loader.finish(recorded.about.recorded_until);
   return recorded;
 }

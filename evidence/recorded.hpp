@@ -57,6 +57,7 @@ struct Run {
   std::vector<PortChange> port_changes;         // of input ports, as they were recorded
   // Of output ports, by name, as they were recorded.
   std::map<std::string, std::vector<PortChange>> output_changes;
+  std::vector<Missed> gaps;        // in which events are missing, since a time that is known
   std::uint64_t lost = 0;          // events
   std::uint64_t left_out = 0;      // arrivals of another memory, that of the next run
   std::uint64_t lost_samples = 0;  // whose arrival is there, but not what was in them
@@ -71,7 +72,11 @@ struct Recorded {
 [[nodiscard]] std::string missed_text(std::uint64_t events, std::uint64_t samples);
 [[nodiscard]] std::string missed_text(const Recorded& recorded);
 
+// What a recording is read for.
+enum class Wanted : std::uint8_t { all, winners };  // winners: without most steps and decisions
+
 // Throws McapError, RecordError.
-[[nodiscard]] Recorded load_recording(const std::string& path, const recording::Watch& watch = {});
+[[nodiscard]] Recorded load_recording(const std::string& path, const recording::Watch& watch = {},
+                                      Wanted wanted = Wanted::all);
 
 }  // namespace arbiter::evidence

@@ -45,7 +45,11 @@ void WinnerTrack::set_rules(std::shared_ptr<const RuleTable> rules, std::uint64_
 void WinnerTrack::apply(const std::string& source, ActivityWord word, Nanoseconds time,
                         WinnerChange::Why why) {
   advance(time);
-  words_[source] = word;
+  if (shm::is_active(word, now_)) {
+    words_[source] = word;
+  } else {
+    words_.erase(source);
+  }
   note_end(source, word);
   const shm::SourceId id = rules_ == nullptr ? shm::kNone : rules_->source(source);
   if (id == shm::kNone) return;
@@ -69,8 +73,10 @@ void WinnerTrack::advance(Nanoseconds time) {
     if (noted == noted_.end() || noted->second != end) continue;
     noted_.erase(noted);
     now_ = std::max(now_, end);
-    const ActivityWord word = words_[source];
+    const auto known = words_.find(source);
+    const ActivityWord word = known == words_.end() ? shm::kNeverActive : known->second;
     note_end(source, word);
+    if (word == end) words_.erase(known);
     const shm::SourceId id = rules_ == nullptr ? shm::kNone : rules_->source(source);
     if (id != shm::kNone && word == end) look_where(id, now_, WinnerChange::Why::expiry, source);
   }

@@ -5,6 +5,7 @@
 // winner that it makes are told for the time that the track had reached.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <map>
@@ -36,6 +37,8 @@ class WinnerTrack {
   void advance(Nanoseconds time);
 
   [[nodiscard]] Nanoseconds now() const { return now_; }
+  // How many sources are active, as far as has been told.
+  [[nodiscard]] std::size_t sources() const { return words_.size(); }
   // Of the ports that somebody wins at.
   [[nodiscard]] const std::map<std::string, std::string>& winners() const { return winners_; }
 
@@ -52,7 +55,7 @@ class WinnerTrack {
   std::uint64_t generation_ = 0;
   bool is_first_ = true;  // no rules have been set since the start
   Nanoseconds now_ = 0;
-  std::unordered_map<std::string, ActivityWord> words_;
+  std::unordered_map<std::string, ActivityWord> words_;  // of those that are active
   std::vector<ActivityWord> by_id_;
   std::unordered_map<shm::SourceId, std::string> names_;
   std::map<std::string, std::string> winners_;

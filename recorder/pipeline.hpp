@@ -2,6 +2,8 @@
 // hands both on. A thread of its own, which may wait for a disk.
 #pragma once
 
+#include <algorithm>
+#include <cstddef>
 #include <cstdint>
 #include <exception>
 #include <functional>
@@ -33,7 +35,13 @@ class TimeOrder {
       waiting_.pop();
       use(record);
     }
+    if (last_.size() <= 2 * kept_) return;
+    // What comes later, even with a time before, is behind all that has gone.
+    std::erase_if(last_, [&](const auto& each) { return each.second < horizon; });
+    kept_ = std::max(last_.size(), kFewSources);
   }
+  // Of how many sources something is kept.
+  [[nodiscard]] std::size_t sources() const { return last_.size(); }
 
  private:
   struct Waiting {
@@ -45,7 +53,9 @@ class TimeOrder {
     }
   };
   std::priority_queue<Waiting> waiting_;
-  std::unordered_map<std::string, Nanoseconds> last_;  // key of each source
+  static constexpr std::size_t kFewSources = 1024;
+  std::unordered_map<std::string, Nanoseconds> last_;  // key of each source that has told lately
+  std::size_t kept_ = kFewSources;                     // of them, when it was last looked
   std::uint64_t number_ = 0;
 };
 

@@ -89,6 +89,7 @@ bool TapReader::poll(Backlog& backlog, std::vector<RecordPtr>& records) {
                     kind == TapEventKind::destinations;
     take(*event, backlog, records);
     count();
+    last_ = std::max(last_, ns(event->time()));
     is_live = kind != TapEventKind::closed;
     told_.store(word_of(*event), std::memory_order_relaxed);
   }
@@ -141,8 +142,8 @@ void TapReader::add_state(const TapEvent<>& event, Nanoseconds seen,
   state.word = word_of(event);
   if (state.lost != 0) {
     counts_.lost_events += state.lost;
-    add(records,
-        Missed{state.context->source, 0, state.time, state.lost, 0, Missed::Why::overtaken, ""});
+    add(records, Missed{state.context->source, last_, std::max(last_, state.time), state.lost, 0,
+                        Missed::Why::overtaken, ""});
   }
   add(records, std::move(state));
 }
@@ -185,7 +186,7 @@ std::optional<Missed::Why> TapReader::take_payload(const TapEvent<>& event, cons
 void TapReader::leave_out(const TapEvent<>& event, Nanoseconds seen) {
   if (!left_out_) {
     left_out_.emplace();
-    left_out_->from = ns(event.time());
+    left_out_->from = event.lost() != 0 ? last_ : ns(event.time());
   }
   LeftOut& out = *left_out_;
   out.to = ns(event.time());

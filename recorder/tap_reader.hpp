@@ -110,6 +110,7 @@ class TapReader {
   evidence::ContextPtr context_;
   std::optional<LeftOut> left_out_;
   TapCounts counts_;
+  Nanoseconds last_ = 0;  // of what has happened, as far as has been told; 0: nothing has been
   std::atomic<std::uint64_t> polled_{0};  // twice the number of polls, and 1 if a port is open
   std::atomic<evidence::ActivityWord> told_;
 };

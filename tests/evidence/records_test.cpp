@@ -95,25 +95,6 @@ TEST(Records, AreReadAsTheyWereWritten) {
   EXPECT_TRUE(has_payload);
 }
 
-// A recording in which nothing happens goes on all the same.
-TEST(Records, EndWhenRecordingDid) {
-  Incident incident;
-  incident.arrive("/low", 1010, 1011, Incident::Fate::accepted);
-  EXPECT_EQ(incident.read().runs.at(0).end, 1011);
-  EXPECT_EQ(evidence::load_recording(incident.file(3000)).runs.at(0).end, 3000);
-  EXPECT_EQ(evidence::load_recording(incident.file(1005)).runs.at(0).end, 1011);
-  EXPECT_EQ(evidence::load_recording(incident.file(shm::kForever)).runs.at(0).end, 1011)
-      << "no time of a clock";
-}
-
-TEST(Records, EndWithTheLastChangeOfAWinnerAtLeast) {
-  Incident incident;
-  incident.arrive("/low", 1010, 1011, Incident::Fate::accepted);
-  incident.add(evidence::WinnerChange{"/p", "", "/low", 1510, evidence::WinnerChange::Why::expiry,
-                                      "/low", 1});
-  EXPECT_EQ(incident.read().runs.at(0).end, 1510);
-}
-
 TEST(Records, AreOrderedByWallTimeThroughTheOffset) {
   Incident incident;
   add_everything(incident);

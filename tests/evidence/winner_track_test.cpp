@@ -76,6 +76,19 @@ TEST_F(TrackedWinners, ChangeNoEarlierThanSomethingElseHasMattered) {
   EXPECT_EQ(told().back(), "270 /low deactivation /high");
 }
 
+// Names may come and go for as long as it is recorded.
+TEST_F(TrackedWinners, AreKnownWithoutTheSourcesThatAreOver) {
+  for (int i = 0; i < 100; ++i) arrive("/passing" + std::to_string(i), 100 + i);
+  arrive("/low", 150);
+  track_.apply("/passing0", shm::deactivation(300), 300, Why::deactivation);
+  EXPECT_EQ(track_.sources(), 100u);
+  track_.advance(640);
+  EXPECT_EQ(track_.sources(), 60u);
+  track_.advance(2000);
+  EXPECT_EQ(track_.sources(), 0u);
+  EXPECT_EQ(told(), (Lines{"199 /low arrival /low", "650 - expiry /low"}));
+}
+
 TEST_F(TrackedWinners, ChangeByTheModel) {
   arrive("/low", 100);
   arrive("/high", 200);

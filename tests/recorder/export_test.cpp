@@ -236,6 +236,28 @@ TEST(RecordedWinners, CountsComponentsOfWhichThereAreTooMany) {
   EXPECT_FALSE(last.contains("other_components"));
 }
 
+TEST(RecordedWinners, DoNotTakeWhatWasMissedForSilence) {
+  using Why = evidence::WinnerChange::Why;
+  Incident incident;
+  incident.arrive("/low", 1100, 1101, Incident::Fate::accepted);
+  incident.add(evidence::WinnerChange{"/p", "/low", "", 1100, Why::arrival, "/low", 1});
+  incident.add(evidence::WinnerChange{"/p", "", "/low", 1600, Why::expiry, "/low", 1});
+  incident.add(evidence::Missed{"/low", 1100, 2000, 9, 0, evidence::Missed::Why::overtaken, ""});
+  incident.state("/low", 2000, 2001, shm::arrival(2000, 500), evidence::SourceState::Why::gap, 9);
+  incident.add(evidence::WinnerChange{"/p", "/low", "", 2000, Why::state, "/low", 1});
+  incident.add(evidence::WinnerChange{"/p", "", "/low", 2500, Why::expiry, "/low", 1});
+  const std::string file = incident.file(3000);
+  const auto result = arbiter({"recording", "winners", file});
+  EXPECT_THAT(result.out,
+              testing::ContainsRegex("idle .*: /low went inactive, unless it arrived in what was "
+                                     "missed\n.*: noticed late\n.*: /low went inactive\n"));
+  EXPECT_THAT(result.err, testing::HasSubstr("missed 9 events: who commanded is uncertain in 1 "
+                                             "gap, "));
+  const auto found = nlohmann::json::parse(arbiter({"recording", "winners", "--json", file}).out);
+  EXPECT_EQ(found[1]["is_in_gap"], false);
+  EXPECT_EQ(found[2]["is_in_gap"], true);
+}
+
 TEST(RecordedWinners, SaysThatNobodyHasWon) {
   Incident incident;
   EXPECT_EQ(arbiter({"recording", "winners", incident.file()}).out,

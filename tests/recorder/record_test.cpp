@@ -314,6 +314,7 @@ TEST(Record, TakesUpASourceOnceItCanBeTapped) {
   high.publish(1);
   taps.clear();
   recording.see("recording /high from here on");
+  await([&] { return daemon.taps_of("/high") == 1; });  // its publisher has answered
   high.publish(2);
   low.publish(3);
   EXPECT_EQ(recording.end(), 0) << recording.error();

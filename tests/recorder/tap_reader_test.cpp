@@ -9,6 +9,7 @@
 
 #include <arbiter/arbiter.hpp>
 
+#include "shm/clock.hpp"
 #include "tests/recorder/recording.hpp"
 
 namespace arbiter::test {
@@ -121,6 +122,23 @@ TEST_F(ReadSource, TakesOneLargePayloadWhereLittleWaits) {
   EXPECT_EQ(arrivals_, 5u);
   EXPECT_EQ(payloads_, 1u);
   EXPECT_EQ(source.counts().lost_events, 0u);
+}
+
+// From the last that was told on, anything may have happened.
+TEST_F(ReadSource, SaysSinceWhenEventsAreMissing) {
+  TapReader source = reader();
+  Backlog backlog{{}, std::size_t{64} << 20};
+  const shm::Nanoseconds before = shm::monotonic_now();
+  low_.signal();
+  poll(source, backlog);
+  const shm::Nanoseconds between = shm::monotonic_now();
+  for (int i = 0; i < 3000; ++i) low_.signal();
+  poll(source, backlog);
+  ASSERT_EQ(missed_.size(), 1u);
+  EXPECT_EQ(missed_[0].why, Missed::Why::overtaken);
+  EXPECT_GE(missed_[0].from, before);
+  EXPECT_LE(missed_[0].from, between);
+  EXPECT_GT(missed_[0].to, between);
 }
 
 }  // namespace

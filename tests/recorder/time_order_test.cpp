@@ -1,7 +1,10 @@
 // In which order the recorder passes on what its sources tell.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cstddef>
 #include <memory>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -54,6 +57,25 @@ TEST(TimeOrder, WhatStandsBehindAGapWaitsForItsTime) {
   EXPECT_EQ(times, (std::vector<evidence::Nanoseconds>{50, 100}));
   order.take_before(1000, note);
   EXPECT_EQ(times, (std::vector<evidence::Nanoseconds>{50, 100, 150, 160}));
+}
+
+// Names may come and go for as long as it is recorded.
+TEST(TimeOrder, ForgetsSourcesThatTellNoMore) {
+  recorder::TimeOrder order;
+  std::size_t most = 0;
+  std::size_t taken = 0;
+  for (int i = 1; i <= 10'000; ++i) {
+    auto context = std::make_shared<evidence::SourceContext>();
+    context->source = "/passing" + std::to_string(i);
+    evidence::Arrival arrival;
+    arrival.context = std::move(context);
+    arrival.time = i;
+    order.add(std::make_shared<const evidence::Record>(std::move(arrival)), i);
+    order.take_before(i, [&](const evidence::RecordPtr&) { ++taken; });
+    most = std::max(most, order.sources());
+  }
+  EXPECT_EQ(taken, 9'999u);
+  EXPECT_LT(most, 5'000u);
 }
 
 }  // namespace
