@@ -148,8 +148,10 @@ Sampler::Seat Sampler::first_seat(shm::PortId port) const {
     const auto found = last_.words.find(source);
     return found == last_.words.end() ? shm::kNeverActive : found->second;
   };
-  const rules::Tenure tenure = rules::tenure_of(last_.snapshot.table, port, seat.winner,
-                                                {last_.now, census_->first_model_since, word});
+  const auto began = [this](shm::SourceId source) { return last_.beginning_of(source); };
+  const rules::Tenure tenure =
+      rules::tenure_of(last_.snapshot.table, port, seat.winner,
+                       {last_.now, census_->first_model_since, word, {}, began});
   seat.since = std::max(tenure.at_least, census_->first_model_since);
   seat.is_exact = tenure.is_exact();
   return seat;
@@ -203,15 +205,14 @@ std::string Sampler::cause_of(shm::PortId port, std::uint64_t generation_before,
   const shm::TableView& table = last_.snapshot.table;
   const auto was = [this](shm::SourceId source) { return before_.is_active(source); };
   const auto is = [this](shm::SourceId source) { return last_.is_active(source); };
+  const auto causes = rules::causes_of_change(table, port, was, is);
+  at = last_.selected_since(before_, port, causes);
   std::string text;
-  for (const shm::SourceId source : rules::causes_of_change(table, port, was, is)) {
+  for (const shm::SourceId source : causes) {
     // A table that is not whole may name any source: take_seats() forgets what is said of that.
     const auto found = last_.words.find(source);
     if (found == last_.words.end()) continue;
-    const shm::ActivityWord word = found->second;
-    const bool has_expired = shm::is_finite(word) && !is(source);
-    const shm::Nanoseconds time = has_expired ? word : shm::time_of(word, table.timeout(source));
-    at = std::min(at, std::max(time, before_.now));
+    const bool has_expired = shm::is_finite(found->second) && !is(source);
     text += (text.empty() ? "" : ", ") + name_of(source) +
             (is(source)    ? " became active"
              : has_expired ? " went inactive"

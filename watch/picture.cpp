@@ -7,6 +7,7 @@
 #include "shm/clock.hpp"
 #include "shm/limits.hpp"
 #include "shm/picture.hpp"
+#include "watch/sources.hpp"
 
 namespace arbiter::watch {
 namespace {
@@ -44,6 +45,37 @@ std::optional<shm::Nanoseconds> Picture::age_of(shm::SourceId source) const {
   const shm::Nanoseconds last = shm::time_of(found->second, snapshot.table.timeout(source));
   if (last < 0) return std::nullopt;
   return now - last;
+}
+
+std::optional<shm::Nanoseconds> Picture::beginning_of(shm::SourceId source) const {
+  const auto found = began.find(source);
+  return found == began.end() ? std::nullopt : std::optional(found->second);
+}
+
+shm::Nanoseconds Picture::changed_at(shm::SourceId source) const {
+  const auto word = words.find(source);
+  if (word == words.end()) return now;
+  SourceState state{word->second, snapshot.table.timeout(source)};
+  state.began = beginning_of(source);
+  return event_time(state, now);
+}
+
+// One by one the causes are taken back, the latest first.
+shm::Nanoseconds Picture::selected_since(const Picture& before, shm::PortId port,
+                                         std::vector<shm::SourceId> causes) const {
+  std::sort(causes.begin(), causes.end(),
+            [this](auto one, auto other) { return changed_at(one) < changed_at(other); });
+  const auto without = [&](shm::SourceId source) {
+    const bool has_changed = std::find(causes.begin(), causes.end(), source) != causes.end();
+    return (has_changed ? *this : before).is_active(source);
+  };
+  while (!causes.empty()) {
+    const shm::Nanoseconds time = changed_at(causes.back());
+    causes.pop_back();
+    if (shm::selected_at(snapshot.table, port, without).source == winner_at(port)) continue;
+    return std::clamp(time, before.now, now);
+  }
+  return now;
 }
 
 bool Picture::is_unseen(shm::SourceId source) const {

@@ -30,6 +30,14 @@ struct Picture {
   }
   // Since its last arrival or deactivation; nothing: it had none.
   [[nodiscard]] std::optional<shm::Nanoseconds> age_of(shm::SourceId source) const;
+  [[nodiscard]] std::optional<shm::Nanoseconds> beginning_of(shm::SourceId source) const;
+  // When what happened to a source last did happen, as event_time() has it; now, if it is not of
+  // the picture, as where a table that is being overwritten names any.
+  [[nodiscard]] shm::Nanoseconds changed_at(shm::SourceId source) const;
+  // Since when the port has selected what it does, where that was another source in the picture
+  // `before`, by the same model: the change of `causes` made it so.
+  [[nodiscard]] shm::Nanoseconds selected_since(const Picture& before, shm::PortId port,
+                                                std::vector<shm::SourceId> causes) const;
   [[nodiscard]] bool is_unseen(shm::SourceId source) const;
   // The source that the port selects by the rules; kNone: none, or the port is not arbitrated. The
   // picture must be of all sources that the port heeds.

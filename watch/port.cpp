@@ -77,8 +77,7 @@ void Port::read_table(Look& look) const {
   look.sources.set_time(look.picture.now);
   for (const auto& [source, word] : look.picture.words) {
     SourceState state{word, look.table().timeout(source), !look.picture.is_unseen(source)};
-    const auto began = look.picture.began.find(source);
-    if (began != look.picture.began.end()) state.began = began->second;
+    state.began = look.picture.beginning_of(source);
     look.sources.set(source_name(source), state);
   }
 }

@@ -1,12 +1,10 @@
 #include "watch/winners.hpp"
 
-#include <algorithm>
 #include <set>
 #include <utility>
 
 #include "rules/explain/change.hpp"
 #include "rules/explain/tenure.hpp"
-#include "watch/sources.hpp"
 
 namespace arbiter::watch {
 
@@ -82,14 +80,7 @@ shm::Nanoseconds Winners::time_of(const WinnerAt& change, shm::PortId port,
   const auto causes = rules::causes_of_change(
       table, port, [this](shm::SourceId source) { return picture_.is_active(source); },
       [&](shm::SourceId source) { return picture.is_active(source); });
-  shm::Nanoseconds time = picture.now;
-  for (const shm::SourceId source : causes) {
-    const auto word = picture.words.find(source);
-    if (word == picture.words.end()) continue;
-    time = std::min(time, event_time({word->second, table.timeout(source)}, picture.now));
-  }
-  // One that has been renewed since tells of its last arrival only: it was after the last look.
-  return std::max(time, picture_.now);
+  return picture.selected_since(picture_, port, causes);
 }
 
 }  // namespace arbiter::watch

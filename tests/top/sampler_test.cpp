@@ -116,6 +116,19 @@ TEST_F(TopSampler, SinceIsWhenTheWinnerBegan) {
   EXPECT_LE(state.since, after);
   low.publish(2);
   EXPECT_EQ(look()->ports.at(0).since, state.since);  // it has gone on
+  Sampler late(instance_);
+  take_census(late);
+  late.look();
+  EXPECT_EQ(late.frame()->ports.at(0).since, state.since);  // as its beginning tells
+  low.deactivate();
+  look();
+  const shm::Nanoseconds again = shm::monotonic_now();
+  low.publish(3);
+  const shm::Nanoseconds between = shm::monotonic_now();
+  low.publish(4);
+  const shm::Nanoseconds since = look()->ports.at(0).since;
+  EXPECT_GE(since, again);
+  EXPECT_LE(since, between);
 }
 
 TEST_F(TappingSampler, ATapTellsOfWinnersThatComeAndGoBetweenTwoLooks) {

@@ -8,6 +8,7 @@
 
 #include <arbiter/arbiter.hpp>
 
+#include "shm/clock.hpp"
 #include "tests/watch/watched.hpp"
 
 namespace arbiter::test {
@@ -47,6 +48,35 @@ TEST(Winners, AreNotTakenForOthersWhileASourceCannotBeSeen) {
   EXPECT_EQ(news[0].winner, "/other");
   EXPECT_EQ(news[0].before, "/low");
   EXPECT_FALSE(news[0].is_first);
+}
+
+// A source that has arrived again since tells of when it began; where two must come together, the
+// later one counts.
+TEST(Winners, WinSinceTheyBeganHoweverLateThatIsSeen) {
+  Daemon daemon(R"(<behaviors timeout="forever">
+  <arbiter at="/one"><select from="/low"/></arbiter>
+  <arbiter at="/two"><select from="/low">/high</select></arbiter>
+</behaviors>
+)");
+  Node node("test");
+  auto low = node.output_port<int>("/low");
+  auto high = node.output_port<int>("/high");
+  const auto instance = watched(daemon);
+  watch::Winners winners(instance, [](std::string_view) { return true; });
+  ASSERT_EQ(winners.look().size(), 2u);
+  low.publish(1);
+  const shm::Nanoseconds between = shm::monotonic_now();
+  low.publish(2);
+  high.publish(1);
+  const shm::Nanoseconds after = shm::monotonic_now();
+  high.publish(2);
+  const auto news = winners.look();
+  ASSERT_EQ(news.size(), 2u);
+  EXPECT_EQ(news[0].port, "/one");
+  EXPECT_LE(news[0].time, between);
+  EXPECT_EQ(news[1].port, "/two");
+  EXPECT_GE(news[1].time, between);
+  EXPECT_LE(news[1].time, after);
 }
 
 }  // namespace
