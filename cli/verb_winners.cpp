@@ -72,7 +72,7 @@ class Announcer {
       }
       const auto changes = winners_->look();
       for (const watch::WinnerAt& change : changes) tell(change);
-      warn_of_patterns_without_winners();
+      look_at_model();
       if (!goes_on()) return 1;
       const shm::Nanoseconds now = shm::monotonic_now();
       if (now >= open_again_ && instance_->has_daemon()) {
@@ -251,14 +251,25 @@ class Announcer {
     return may_go_on;
   }
 
-  // Once for each model that comes into force: it may arbitrate other ports than the one before.
-  void warn_of_patterns_without_winners() {
-    if (options_.patterns == WinnersOptions().patterns) return;
+  // Once for each model that comes into force: it may arbitrate other ports than the one before,
+  // and a policy may have come with it that keeps us from asking.
+  void look_at_model() {
     const auto model = models_.unknown(*instance_);
     if (!model) return;
     try {
-      PatternCheck("--port", instance_->status()).arbitrated_inputs(options_.patterns);
+      if (options_.patterns == WinnersOptions().patterns) {
+        instance_->catch_up();
+      } else {
+        PatternCheck("--port", instance_->status()).arbitrated_inputs(options_.patterns);
+      }
       models_.note(*model);
+      if (std::exchange(may_not_observe_, false)) std::cerr << "arbiter: the daemon tells again\n";
+    } catch (const wire::RefusedError& error) {
+      models_.put_off();
+      if (std::exchange(may_not_observe_, true)) return;
+      std::cerr << "arbiter: of ports with new sources nothing new is announced, for the daemon "
+                   "refuses to tell; trying again every 5 seconds: "
+                << error.what() << '\n';
     } catch (const wire::CallError&) {  // it has gone since, or is busy
       models_.put_off();
     }
@@ -293,6 +304,7 @@ class Announcer {
   shm::Nanoseconds open_again_ = shm::monotonic_now() + kOpenEvery;
   bool has_said_why_not_ = false;  // that the daemon that has come last does not let it begin again
   ModelNews models_;               // that it has been warned of
+  bool may_not_observe_ = false;
   DaemonNews news_{"announcing"};
 };
 

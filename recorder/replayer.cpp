@@ -35,13 +35,21 @@ bool fits(const std::vector<std::string>& patterns, const std::string& name) {
                      [&](const std::string& pattern) { return rules::matches(pattern, name); });
 }
 
-// The daemon says in words why a port cannot be opened. If it has not answered, other ports are no
-// help.
+// The daemon says in words why a port cannot be opened.
+bool is_taken(const std::string& refusal) {
+  return refusal.find(" is held by ") != std::string::npos;
+}
+
+// If it has not answered, other ports are no help.
 std::string advice_for(const std::string& refusal, const std::string& port) {
   if (refusal.find(port) == std::string::npos) return "";
-  const bool is_taken = refusal.find(" is held by ") != std::string::npos;
-  return std::string(is_taken ? ". Stop that component, choose" : ". Choose") +
+  return std::string(is_taken(refusal) ? ". Stop that component, choose" : ". Choose") +
          " other sources with --source, or replay into an instance of its own with --instance";
+}
+
+// What `arbiter winners` says of the instance itself counts there, not what it said elsewhere.
+bool is_announced_there(const std::string& source, const std::string& refusal) {
+  return source.starts_with("/arbiter/winner/") && is_taken(refusal);
 }
 
 // By the rule of ports (Type).
@@ -189,10 +197,15 @@ void Replayer::open_port(const std::string& name, Source& source) {
 void Replayer::open_ports() {
   node_.emplace("arbiter-replay", options_.node);
   keeps_times_ = options_.speed > 0;
+  std::vector<std::string> announced;
   for (auto& [name, source] : sources_) {
     try {
       open_port(name, source);
     } catch (const Error& error) {
+      if (is_announced_there(name, error.what())) {
+        announced.push_back(name);
+        continue;
+      }
       throw ReplayError(error.what() + advice_for(error.what(), name));
     }
     if (!keeps_times_) continue;
@@ -204,6 +217,10 @@ void Replayer::open_ports() {
                    "; arrivals bear the times at which they are published");
     }
   }
+  if (announced.empty()) return;
+  for (const std::string& name : announced) sources_.erase(name);
+  options_.say("not published, for a component there announces who commands: " +
+               rules::enumerate(announced));
 }
 
 Replayed Replayer::run(const shm::FileDescriptor& interrupts) {

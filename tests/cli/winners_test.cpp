@@ -243,6 +243,31 @@ TEST_F(Winners, OfAPortThatAnotherModelDoesNotArbitrateAreSaidToBeNone) {
   });
 }
 
+TEST(WinnersOfADaemon, ThatTellsNoMoreAreNotTakenForAll) {
+  const TemporaryDirectory files;
+  const std::string policy = files.write("policy", "allow everyone all\n");
+  Daemon daemon(kWinnersModel, {.arguments = {"--policy", policy}});
+  const std::string path = daemon.directory() + "/winners.err";
+  const shm::FileDescriptor err(
+      ::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600));
+  ChildProcess program({std::string(ARBITER_PROGRAMS) + "/arbiter", "winners"}, {},
+                       {-1, -1, err.get()});
+  const auto says = [&](const char* text) {
+    await([&] { return content_of(path).find(text) != std::string::npos; });
+  };
+  says("announcing /gaze:i");
+  files.write("policy", "deny everyone observe\nallow everyone all\n");
+  daemon.write_model(R"(<behaviors timeout="1000s">)" + kBehaviours);
+  daemon.hang_up();
+  says("the daemon refuses to tell");
+  files.write("policy", "allow everyone all\n");
+  daemon.write_model(kWinnersModel);
+  daemon.hang_up();
+  says("the daemon tells again");
+  program.signal(SIGINT);
+  EXPECT_EQ(program.wait(), 0);
+}
+
 TEST(WinnersWithoutADaemon, AreNone) {
   const auto result = arbiter({"winners", "--instance", "nobody-has-this"});
   EXPECT_EQ(result.exit_code, 1);
