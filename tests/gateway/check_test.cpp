@@ -1,12 +1,9 @@
-// Mappings beside each other and beside a model.
+// Entries beside each other and beside a model.
 #include <gmock/gmock.h>
 
-#include <cstdlib>
+#include <string>
 
-#include "gateway/mapping/check_owners.hpp"
-#include "rules/model/application_reader.hpp"
-#include "rules/model/load.hpp"
-#include "tests/gateway/mapping_text.hpp"
+#include "tests/gateway/check_scene.hpp"
 
 namespace arbiter::gateway {
 namespace {
@@ -14,43 +11,6 @@ namespace {
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
-
-constexpr const char* kModel =
-    "<behaviors timeout='500ms'>"
-    "<source port='/EStop/pressed:o' timeout='forever'/>"
-    "<behavior name='Drive'><config at='/Base/cmd:i'>/Nav/cmd:o</config>"
-    "<condition>not /EStop/pressed:o</condition></behavior>"
-    "</behaviors>";
-
-// What is found of the entries of a gateway (its line 1), in that model; empty: without one.
-Read check(const std::string& mapping, const std::string& model = kModel) {
-  Read read = read_text(mapping);
-  EXPECT_THAT(read.findings(), IsEmpty());
-  if (model.empty()) {
-    check_mappings({read.mapping}, nullptr, read.diagnostics);
-    return read;
-  }
-  rules::Diagnostics of_model;
-  rules::ModelTexts texts;
-  texts.models.push_back({"model.xml", model});
-  const rules::RuleSet rules = rules::load(std::move(texts), of_model);
-  EXPECT_FALSE(of_model.has_errors());
-  check_mappings({read.mapping}, &rules, read.diagnostics);
-  return read;
-}
-
-std::string dds(const std::string& entries, const std::string& more = "") {
-  return "<gateway kind='dds' " + more + ">" + entries + "</gateway>";
-}
-
-std::string in(const std::string& topic, const std::string& port, const std::string& more = "") {
-  return "<in topic='" + topic + "' type='geometry_msgs/msg/Twist' port='" + port + "' " + more +
-         "/>";
-}
-std::string out(const std::string& topic, const std::string& port, const std::string& more = "") {
-  return "<out topic='" + topic + "' type='geometry_msgs/msg/Twist' port='" + port +
-         "' idle='zero' " + more + "/>";
-}
 
 TEST(CheckMapping, AGoodMappingHasNoFindings) {
   EXPECT_THAT(check(dds(in("/nav", "/Nav/cmd:o") + out("/cmd", "/Base/cmd:i"))).findings(),
@@ -103,110 +63,6 @@ TEST(CheckMapping, APortHasOneEntry) {
   const Read read = check(dds(in("/a", "/Nav/cmd:o") + in("/b", "/Nav/cmd:o")));
   ASSERT_EQ(read.findings().size(), 1u);
   EXPECT_THAT(read.message(), HasSubstr("has an entry already, at mapping.xml:1:74"));
-}
-
-TEST(CheckMapping, ATopicThatComesInAgainIsACircle) {
-  const auto codes = [](const std::string& mapping) {
-    std::vector<std::string> result;
-    const Read read = check(mapping, "");
-    for (const auto& item : read.diagnostics.items()) result.push_back(item.code);
-    return result;
-  };
-  const std::string both = in("/cmd", "/Nav/cmd:o") + out("/cmd", "/Base/cmd:i");
-  EXPECT_THAT(codes(dds(both)), ElementsAre("circle"));
-  EXPECT_THAT(codes(dds(in("/cmd", "/Nav/cmd:o"), "domain='1'") +
-                    dds(out("/cmd", "/Base/cmd:i"), "domain='2'")),
-              IsEmpty());
-  EXPECT_THAT(codes(dds(in("/cmd", "/Nav/cmd:o")) + dds(out("/cmd", "/Base/cmd:i"), "domain='0'")),
-              ElementsAre("circle"));
-  const auto parted = [&](const std::string& one, const std::string& other) {
-    return codes(dds(in("/cmd", "/Nav/cmd:o", "partition='" + one + "'") +
-                     out("/cmd", "/Base/cmd:i", "partition='" + other + "'")));
-  };
-  EXPECT_THAT(parted("a", "b"), IsEmpty());
-  EXPECT_THAT(parted("a", "b,a"), ElementsAre("circle"));
-  EXPECT_THAT(parted("a*", "abc"), ElementsAre("circle"));
-  const std::string end = " service='a' instance='b' event='c' ";
-  EXPECT_THAT(codes("<gateway kind='iceoryx'><in" + end + "port='/a:o'/><out" + end +
-                    "port='/b:i' size='1' idle='zero'/></gateway>"),
-              ElementsAre("circle"));
-}
-
-// As at the start of the gateway, whose environment it is.
-TEST(CheckMapping, ADomainThatIsNotNamedIsTheEnvironments) {
-  const std::string mapping =
-      dds(in("/cmd", "/Nav/cmd:o"), "domain='7'") + dds(out("/cmd", "/Base/cmd:i"));
-  EXPECT_THAT(check(mapping).findings(), IsEmpty());
-  ::setenv("ROS_DOMAIN_ID", "7", 1);
-  EXPECT_THAT(check(mapping).findings(), ElementsAre(testing::HasSubstr("error circle")));
-  ::setenv("ROS_DOMAIN_ID", "7x", 1);
-  EXPECT_THAT(check(mapping).findings(), IsEmpty());
-  ::unsetenv("ROS_DOMAIN_ID");
-}
-
-// A program would say so when it starts.
-TEST(CheckMapping, AProgramHasOneConfigurationForADomain) {
-  const std::string first = dds(in("/a", "/Nav/cmd:o"), "domain='3' interface='lo'");
-  const auto second = [](const std::string& more) { return dds(in("/b", "/other:o"), more); };
-  const auto findings = [](const std::string& mapping) { return check(mapping, "").findings(); };
-  EXPECT_THAT(findings(first + second("domain='3' interface='lo'")), IsEmpty());
-  EXPECT_THAT(findings(first + second("domain='4' interface='eth0'")), IsEmpty());
-  for (const char* other : {"domain='3'", "domain='3' interface='lo' peers='10.0.0.1'",
-                            "domain='3' interface='lo' configuration='x.xml'"}) {
-    EXPECT_THAT(findings(first + second(other)), ElementsAre(HasSubstr("error two-configurations")))
-        << other;
-  }
-  // Of two files nobody knows here whether one program is given both.
-  Read one = read_text(first);
-  const rules::TextFile file("second.xml", second("domain='3'"));
-  const Mapping other = read_mapping(file, one.diagnostics);
-  check_mappings({one.mapping, other}, nullptr, one.diagnostics);
-  ASSERT_THAT(one.findings(), ElementsAre("1:1 warning two-configurations"));
-  EXPECT_THAT(one.message(), HasSubstr("the gateway at mapping.xml:1:1 joins domain 3 with "));
-}
-
-TEST(CheckMapping, TwoPortsThatCommandOneTopicAreNotArbitratedAgainstEachOther) {
-  const Read read = check(dds(out("/cmd", "/a:i") + out("/cmd", "/b:i")), "");
-  ASSERT_EQ(read.diagnostics.items().size(), 1u);
-  EXPECT_EQ(read.diagnostics.items()[0].code, "two-outs");
-  EXPECT_EQ(read.diagnostics.items()[0].about.ports, std::vector<std::string>{"/b:i"});
-}
-
-TEST(CheckMapping, OfManyThatCommandOneTopicEachIsFoundOnce) {
-  std::string outs;
-  for (const char* port : {"/a:i", "/b:i", "/c:i", "/d:i"}) outs += out("/cmd", port);
-  EXPECT_THAT(check(dds(outs), "").findings(), testing::SizeIs(3));
-  const auto parted = [](const std::string& partition) { return "partition='" + partition + "'"; };
-  const Read read =
-      check(dds(in("/cmd", "/Nav/cmd:o", parted("c")) + out("/cmd", "/a:i", parted("a")) +
-                out("/cmd", "/b:i", parted("a")) + out("/cmd", "/c:i", parted("a,c"))),
-            "");
-  std::vector<std::string> codes;
-  for (const auto& item : read.diagnostics.items()) codes.push_back(item.code);
-  EXPECT_THAT(codes, testing::UnorderedElementsAre("two-outs", "two-outs", "circle"));
-}
-
-// Somebody may have made them so that to compare each with each takes hours.
-TEST(CheckMapping, PartitionsThatTakeTooLongToCompareAreRefused) {
-  const auto partitions = [](const std::string& each) {
-    std::string list = each;
-    for (int i = 1; i < 64; ++i) list += "," + each;
-    return "partition='" + list + "'";
-  };
-  std::string slow;
-  for (int i = 0; i < 109; ++i) slow += "*a";
-  std::string entries;
-  for (int i = 0; i < 40; ++i) {
-    const std::string number = std::to_string(i);
-    entries += in("/cmd", "/in" + number + ":o", partitions(slow + "*b")) +
-               out("/cmd", "/out" + number + ":i", partitions(std::string(230, 'a')));
-  }
-  std::vector<std::string> errors;
-  const Read read = check(dds(entries), "");
-  for (const auto& item : read.diagnostics.items()) {
-    if (item.severity == rules::Severity::kError) errors.push_back(item.code);
-  }
-  EXPECT_THAT(errors, ElementsAre("too-many-partitions"));
 }
 
 TEST(CheckMapping, APortThatTheModelDoesNotMentionIsFound) {
@@ -363,73 +219,6 @@ TEST(CheckMapping, ASampleOfDdsHasNoUserHeader) {
   EXPECT_THAT(check(iceoryx(chunks_in(serialised)) + base).findings(), IsEmpty());
   EXPECT_THAT(check(iceoryx(chunks_in(serialised + " user_header='4'")) + base).message(),
               testing::EndsWith("; DDS has no user headers: connect a topic without one"));
-}
-
-// Who has the ports of kModel, beside an application with these modules. Warnings alone.
-Read owners(const std::string& mapping, const std::string& modules) {
-  Read read = read_text(mapping);
-  EXPECT_THAT(read.findings(), IsEmpty());
-  rules::Diagnostics ignored;
-  rules::ModelTexts texts;
-  texts.models.push_back({"model.xml", kModel});
-  const rules::RuleSet rules = rules::load(std::move(texts), ignored);
-  const rules::TextFile file("app.xml", "<application>\n" + modules + "</application>");
-  const rules::Application application = rules::read_application(file, read.diagnostics);
-  check_owners({read.mapping}, rules, application, read.diagnostics);
-  return read;
-}
-
-std::string module_called(const std::string& name, const std::string& more = "") {
-  return "<module><name>" + name + "</name>" + more + "</module>\n";
-}
-
-TEST(CheckOwners, EachPortHasOneOfAModuleAndAMapping) {
-  const std::string nav = dds(in("/nav", "/Nav/cmd:o"));
-  EXPECT_THAT(owners(nav, module_called("/Base")).findings(), IsEmpty());
-  EXPECT_THAT(owners(nav, "").findings(), IsEmpty()) << "no modules: nothing is known";
-}
-
-TEST(CheckOwners, APortThatNobodyHasIsFound) {
-  const Read read = owners(dds(in("/nav", "/Nav/cmd:o")), module_called("/Other"));
-  ASSERT_THAT(read.findings(), ElementsAre(HasSubstr("warning no-owner")));
-  EXPECT_THAT(read.message(), HasSubstr("/Base/cmd:i is in no mapping and belongs to no module"));
-  EXPECT_THAT(owners(dds(in("/nav", "/Nav/cmmd:o")), module_called("/Base")).message(),
-              HasSubstr("nobody publishes there; did you mean \"/Nav/cmmd:o\"?"));
-}
-
-// No application says whether a component has it.
-TEST(CheckTakers, AnInputPortThatNoEntryTakesFromIsNoted) {
-  rules::Diagnostics ignored;
-  rules::ModelTexts texts;
-  texts.models.push_back({"model.xml", kModel});
-  const rules::RuleSet rules = rules::load(std::move(texts), ignored);
-  Read without = read_text(dds(in("/nav", "/Nav/cmd:o")));
-  check_takers({without.mapping}, rules, without.diagnostics);
-  ASSERT_THAT(without.findings(), ElementsAre(HasSubstr("note no-taker")));
-  EXPECT_THAT(without.message(), HasSubstr("no mapping takes what /Base/cmd:i gets"));
-  Read with = read_text(dds(in("/nav", "/Nav/cmd:o") + out("/cmd", "/Base/cmd:i")));
-  check_takers({with.mapping}, rules, with.diagnostics);
-  EXPECT_THAT(with.findings(), IsEmpty());
-}
-
-TEST(CheckOwners, APortThatTwoHaveIsFound) {
-  const std::string both = dds(in("/nav", "/Nav/cmd:o") + out("/cmd", "/Base/cmd:i"));
-  const Read read = owners(both, module_called("/Nav"));
-  ASSERT_THAT(read.findings(), ElementsAre("1:76 warning two-owners"));
-  EXPECT_THAT(read.message(), HasSubstr("the module \"/Nav\" (app.xml:2:1) as well"));
-  const std::string twins = module_called("/Base") + module_called("/Base");
-  EXPECT_THAT(owners(dds(in("/nav", "/Nav/cmd:o")), twins).findings(),
-              ElementsAre(HasSubstr("warning two-owners")));
-  const std::string elsewhere =
-      module_called("/Base", "<node>one</node>") + module_called("/Base", "<node>other</node>");
-  EXPECT_THAT(owners(dds(in("/nav", "/Nav/cmd:o")), elsewhere).findings(), IsEmpty());
-}
-
-TEST(CheckOwners, AModuleMayStandForTheGateway) {
-  const std::string both = dds(in("/nav", "/Nav/cmd:o") + out("/cmd", "/Base/cmd:i"));
-  EXPECT_THAT(
-      owners(both, module_called("arbiter-gateway-dds", "<prefix>/Nav</prefix>")).findings(),
-      IsEmpty());
 }
 
 }  // namespace
