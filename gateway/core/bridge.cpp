@@ -323,13 +323,10 @@ void Bridge::look_after_all() {
       part->described = std::move(text);
       part->is_trouble = is_trouble;
     }
-    if (!part->pauses.is_over(now)) continue;
-    std::string state = part->account.state();
-    if (state == part->said) continue;
-    part->pauses.begin(now);
+    const std::string state = part->account.state();
+    if (!part->news.take(state, now)) continue;
     say(Level::kInfo, part->entry.ports().front()->name +
                           (part->incoming ? " comes from " : " goes to ") + state);
-    part->said = std::move(state);
   }
   const std::string& obstacle = max_ages_.obstacle();
   ages_.say_once(obstacle.empty() ? "" : "T of the sources is not known: " + obstacle);

@@ -84,8 +84,7 @@ class Bridge {
     Sender* sender = nullptr;
     std::unique_ptr<Incoming> incoming;
     std::unique_ptr<Outgoing> outgoing;
-    std::string said;  // in the log
-    Pauses pauses;
+    News news;  // in the log
     std::string described;
     bool is_trouble = false;  // so described
     Saying waiting;           // for its port

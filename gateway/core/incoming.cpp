@@ -37,14 +37,15 @@ OutputPort<void> open(Node& node, const std::string& name, const Entry& entry) {
                            : node.output_port(name, type, options);
 }
 
+bool has_one_size(const Entry& entry) noexcept { return entry.type && entry.type->size != 0; }
+
 }  // namespace
 
 std::string does_not_fit(const Entry& entry, std::size_t bytes) {
-  const bool has_one_size = entry.type && entry.type->size != 0;
   return "the last bad sample has " + std::to_string(bytes) +
          (bytes == 1 ? " byte; " : " bytes; ") +
-         (has_one_size ? entry.type->name + " has " + std::to_string(entry.type->size)
-                       : "max_size is " + std::to_string(entry.max_size));
+         (has_one_size(entry) ? entry.type->name + " has " + std::to_string(entry.type->size)
+                              : "max_size is " + std::to_string(entry.max_size));
 }
 
 std::optional<Side> choose(const Choice& choice, const ForeignSample& sample) noexcept {
@@ -107,6 +108,12 @@ std::optional<OutputPort<void>>& Incoming::port_of(const Port& port) noexcept {
 // NOLINTNEXTLINE(bugprone-exception-escape)
 Incoming::Fate Incoming::deliver(const ForeignSample& sample, Time deadline) noexcept {
   if (!entry_.choice) return pass_on(sample, deadline);
+  // What cannot be of the entry's type has no field of it.
+  if (has_one_size(entry_) && sample.size() != entry_.type->size) {
+    account_.too_large.add();
+    deactivate_all();
+    return Fate::kTooLarge;
+  }
   const auto side = choose(*entry_.choice, sample);
   if (!side) {
     fail();

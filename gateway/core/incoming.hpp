@@ -62,8 +62,8 @@ class Incoming {
   // One copy into Arbiter's memory, or to where it is sent from, and an arrival, unless `deadline`
   // has passed by then: that of max_age().get(). With a choice: an arrival at the source that the
   // field chooses, if the entry has it, whose own age counts, and then the end of the other's
-  // activity; where nothing can be chosen, of both. publish() throws for another port's loan, and
-  // this one is its own.
+  // activity; where nothing can be chosen, or the size is not the type's, of both. publish() throws
+  // for another port's loan, and this one is its own.
   Fate deliver(const ForeignSample& sample,  // NOLINT(bugprone-exception-escape)
                Time deadline) noexcept;
   // What deliver() publishes is what that `out` entry sends: deliver() then sends it there itself,

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <algorithm>
+#include <string>
 
 #include "shm/activity.hpp"
 
@@ -25,6 +26,23 @@ class Pauses {
  private:
   shm::Nanoseconds length_ = kShortest;
   shm::Nanoseconds until_ = 0;
+};
+
+// What is said when it has changed, with such pauses.
+class News {
+ public:
+  // True: it is said now. Otherwise it was said last, or is to be asked about later.
+  [[nodiscard]] bool take(const std::string& text, shm::Nanoseconds now) {
+    if (text == said_ || !pauses_.is_over(now)) return false;
+    said_ = text;
+    if (text.empty()) return false;
+    pauses_.begin(now);
+    return true;
+  }
+
+ private:
+  std::string said_;
+  Pauses pauses_;
 };
 
 }  // namespace arbiter::gateway

@@ -147,6 +147,7 @@ Session::~Session() {
   }
   // It hangs in a call on RouDi, and uses what is destroyed here.
   say(Level::kWarning, "RouDi does not answer: the gateway ends without taking leave of it");
+  finish_saying();
   std::_Exit(1);
 }
 
@@ -319,7 +320,7 @@ void Session::look_at_list(shm::Nanoseconds now) {
   }
   // Even if the list is the same: a process that has ended stays in it for a while.
   for (Outlet& out : outs_) {
-    look_for_strangers(out);
+    look_for_strangers(out, now);
     look_for_refused(out);
     tell_fault(out);
   }
@@ -344,7 +345,7 @@ void Session::look_for_refused(Outlet& out) const {
 
 // What does not pass the gateway can bypass it. Of a topic that is another gateway's here, that one
 // says so.
-void Session::look_for_strangers(Outlet& out) const {
+void Session::look_for_strangers(Outlet& out, shm::Nanoseconds now) const {
   if (!out.sender->is_served()) return;
   const std::string own = runtime_name(gateway_, ::getpid());
   std::vector<std::string> strangers;
@@ -363,7 +364,9 @@ void Session::look_for_strangers(Outlet& out) const {
   if (!gateways.empty()) {
     text += (text.empty() ? "" : "; ") + ("another gateway has this topic: " + some_of(gateways));
   }
-  if (text == std::exchange(out.strangers, text) || text.empty()) return;
+  out.strangers = text;
+  // Those who come and go without end must not fill a disk.
+  if (!out.news.take(text, now)) return;
   say(Level::kWarning,
       out.sender->entry().outside() + ": " + text +
           (strangers.empty()

@@ -20,6 +20,7 @@
 
 #include "gateway/core/announced.hpp"
 #include "gateway/core/middleware.hpp"
+#include "gateway/core/pauses.hpp"
 #include "gateway/iceoryx/port_list.hpp"
 #include "gateway/iceoryx/publisher.hpp"
 #include "gateway/iceoryx/roudi.hpp"
@@ -111,6 +112,7 @@ class Session {
   struct Outlet {
     ChunkSender* sender;
     std::string strangers{};
+    News news{};                // of those, in the log
     std::string refused{};      // the first of those, or empty
     std::string not_made{};     // why there is no publisher, or empty
     int looks_without_any = 0;  // at the list, while it has subscribers and the publisher none
@@ -126,7 +128,7 @@ class Session {
   void take_for_ever();
   void look_at_list(shm::Nanoseconds now);
   void count_publishers(const Inlet& inlet) const;
-  void look_for_strangers(Outlet& out) const;
+  void look_for_strangers(Outlet& out, shm::Nanoseconds now) const;
   void look_for_refused(Outlet& out) const;
   static void tell_fault(const Outlet& out);
 

@@ -140,6 +140,20 @@ TEST(Pauses, BecomeLongerWhileSomethingIsSaidAgainAndAgain) {
   EXPECT_GE(lines_within(10), 4);
 }
 
+TEST(News, OfStrangersThatComeAndGoForEverIsSaidEverMoreSeldom) {
+  News news;
+  std::int64_t now = 1000 * kSecond;
+  EXPECT_TRUE(news.take("one", now));
+  EXPECT_FALSE(news.take("one", now += Pauses::kLongest)) << "it was said";
+  EXPECT_FALSE(news.take("", ++now)) << "there is nothing to be said";
+  EXPECT_TRUE(news.take("one", ++now)) << "it is true again";
+  EXPECT_FALSE(news.take("another", ++now));
+  EXPECT_TRUE(news.take("another", now += 2 * Pauses::kShortest)) << "if it is still true";
+  int lines = 0;
+  for (int i = 0; i < 86'400; ++i) lines += news.take(i % 2 == 0 ? "" : "one", now += kSecond);
+  EXPECT_LE(lines, 1500);
+}
+
 TEST(Account, AnObstacleStandsInThePlaceOfPeers) {
   Account account("iceoryx a/b/c", "subscriber");
   account.set_peers(3);
