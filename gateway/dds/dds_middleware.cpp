@@ -29,7 +29,6 @@ std::unique_ptr<Domain> join_domain(const Gateway& gateway, const std::set<std::
   try {
     auto domain = std::make_unique<Domain>(gateway, topics, bell);
     words.tell();
-    bell.ring();
     return domain;
   } catch (const DdsError&) {
     if (words.last().empty()) throw;
@@ -222,6 +221,19 @@ void DdsMiddleware::set_problem(Site& site, const std::string& problem) {
   for (Account* const account : site.accounts) account->set_obstacle(problem);
 }
 
+void DdsMiddleware::begin_to_join(Site& site) try {
+  std::packaged_task<std::unique_ptr<Domain>()> join(
+      [this, &site] { return join_domain(*site.gateway, site.topics, bell_); });
+  auto joining = join.get_future();
+  site.joiner = std::jthread([this, join = std::move(join)]() mutable {
+    join();
+    bell_.ring();
+  });
+  site.joining = std::move(joining);
+} catch (const std::system_error& error) {
+  throw DdsError(error.what());
+}
+
 bool DdsMiddleware::has_joined(Site& site) {
   auto patience = std::chrono::milliseconds(0);
   const shm::Nanoseconds now = shm::monotonic_now();
@@ -229,12 +241,7 @@ bool DdsMiddleware::has_joined(Site& site) {
     if (now < site.open_again || is_joining()) return false;
     site.open_again = now + kLongToJoin;
     low_descriptors_.let_go();
-    try {
-      site.joining = std::async(std::launch::async, join_domain, std::cref(*site.gateway),
-                                std::cref(site.topics), std::cref(bell_));
-    } catch (const std::system_error& error) {
-      throw DdsError(error.what());
-    }
+    begin_to_join(site);
     patience = kJoinsWithin;
   }
   if (site.joining.wait_for(patience) != std::future_status::ready) {
@@ -280,7 +287,8 @@ void DdsMiddleware::open(Site& site, EndPoint& end) {
 
 void DdsMiddleware::close(Site& site) noexcept {
   for (EndPoint* const end : site.ends) end->close();
-  site.joining = {};  // waits for it
+  site.joiner = {};  // waits for it
+  site.joining = {};
   site.domain.reset();
   hold_low_descriptors();
 }

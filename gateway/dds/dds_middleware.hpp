@@ -7,6 +7,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "gateway/core/bridge.hpp"
@@ -47,6 +48,7 @@ class DdsMiddleware : public Middleware {
     std::vector<const Entry*> entries;
     // It may not be joined yet: Cyclone waits for a name server, perhaps for long.
     std::future<std::unique_ptr<Domain>> joining;
+    std::jthread joiner;  // rings once that is ready
     std::unique_ptr<Domain> domain;
     shm::Nanoseconds open_again = 0;
     std::string problem;          // why it is not open, which has been said
@@ -61,6 +63,8 @@ class DdsMiddleware : public Middleware {
   void say_domains() const;
   // Says it, and so does each account.
   static void set_problem(Site& site, const std::string& problem);
+  // Throws DdsError.
+  void begin_to_join(Site& site);
   // False: not yet, or another one is being joined, for which Cyclone would let this one wait.
   // Throws DdsError.
   bool has_joined(Site& site);

@@ -2,6 +2,7 @@
 #include <dlfcn.h>
 #include <gtest/gtest.h>
 #include <netdb.h>
+#include <poll.h>
 
 #include <chrono>
 #include <condition_variable>
@@ -82,10 +83,13 @@ TEST(DdsNames, ANameServerThatIsSilentHoldsUpItsDomainAndNotTheLoop) {
     name_server().answers = true;
     name_server().changed.notify_all();
   }
-  test::await([&] {
+  // The loop looks when it rings: for the last time once the domain is joined.
+  pollfd rings{bell.descriptor(), POLLIN, 0};
+  do {
+    ASSERT_EQ(::poll(&rings, 1, 30'000), 1);
+    bell.silence();
     middleware.tend();
-    return send() == Sender::Result::kSent;
-  });
+  } while (send() != Sender::Result::kSent);
 }
 
 }  // namespace
