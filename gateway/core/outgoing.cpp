@@ -120,6 +120,7 @@ void Outgoing::send_idle_sample() noexcept {
 void Outgoing::end() noexcept {
   loop_waits_.store(true, std::memory_order_relaxed);
   const std::lock_guard lock(turn_);
+  loop_waits_.store(false, std::memory_order_relaxed);
   has_ended_ = true;
   has_turn = true;
   send_idle_sample();
@@ -129,7 +130,7 @@ void Outgoing::end() noexcept {
 bool Outgoing::begin_turn(std::size_t bytes) noexcept {
   if (bytes > sender_.largest_at_once()) return false;
   if (has_turn || loop_waits_.load(std::memory_order_relaxed) || !turn_.try_lock()) return false;
-  if (left_ || has_more_ || has_ended_) {
+  if (has_more_ || has_ended_) {
     turn_.unlock();
     return false;
   }

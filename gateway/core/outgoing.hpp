@@ -173,7 +173,7 @@ class Outgoing {
   std::optional<Draft> draft_;
   std::atomic<bool> matched_{false};
   std::atomic<shm::Nanoseconds> next_{shm::kForever};  // when_next()
-  bool has_more_ = false;                              // run() has left samples to the next one
+  bool has_more_ = false;                              // something is left to run(), such as left_
   bool has_ended_ = false;
   // The winner's last sample could not be sent, or not in time. Whoever obeys would go on with the
   // one before, as if nobody commanded: so until one is sent it is told what an idle port is.

@@ -183,6 +183,7 @@ class Beat {
 // once.
 [[noreturn]] void begin_anew(const NeedsNewProcess& why) {
   say(Level::kWarning, std::string(why.what()) + "; the gateway begins anew");
+  finish_saying();
   std::_Exit(kBeginsAnew);
 }
 

@@ -38,8 +38,8 @@ class StandardError {
  public:
   StandardError() : writer_(logging::LogWriter::to_standard_error(begin_of(Level::kWarning))) {}
 
-  // Whoever ends the process next, by a signal or by _Exit(), has its last words in the log. Where
-  // nobody reads it, only the first line waits, until the reader has caught up.
+  // Whoever dies next has its last words in the log, unless the machine is loaded. Where nobody
+  // reads it, only the first line waits, until the reader has caught up.
   void write(std::string line) {
     writer_.put(std::move(line));
     const bool is_unread = is_unread_.load(std::memory_order_relaxed);
@@ -70,6 +70,8 @@ void set_program_name(std::string_view name) { program_name() = name; }
 void say_lines(std::string lines) {
   if (!lines.empty()) standard_error().write(std::move(lines));
 }
+
+void finish_saying() { standard_error().end(); }
 
 void say(Level level, std::string_view text) {
   standard_error().write(begin_of(level) + shm::printable(text) + "\n");

@@ -235,6 +235,7 @@ void end_with_supervisor(const CleanUp& clean_up, const Patience& patience) {
     say(Level::kError, "the supervisor has ended, but the worker did not end within " +
                            in_words(patience.end) + ": killing it");
     clean_up(::getpid());
+    finish_saying();
     ::kill(::getpid(), SIGKILL);
   }).detach();
 }

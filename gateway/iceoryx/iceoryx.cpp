@@ -45,6 +45,7 @@ void handle_error(iox::Error error, const std::function<void()>&, iox::ErrorLeve
   say(Level::kError, std::string("iceoryx gives up: ") + iox::ErrorHandler::toString(error) +
                          (made.empty() ? "" : ": RouDi refuses " + made) +
                          (why_not.empty() ? "" : ": " + why_not));
+  finish_saying();
   std::_Exit(1);
 }
 

@@ -2,7 +2,7 @@
 // each sample that it sends.
 //
 //   chatty_gateway MAPPING…
-//   chatty_gateway last-words    says something, and ends as if it had died
+//   chatty_gateway last-words    says something, writes "said", and ends itself
 //   chatty_gateway flood         says more than may wait, writes "said", waits for the end of its
 //                                standard input
 #include <cstdio>
@@ -60,6 +60,8 @@ int main(int argc, char** argv) {
   const std::string what = argc == 2 ? argv[1] : "";
   if (what == "last-words") {
     say(Level::kError, what);
+    print("said");
+    finish_saying();
     std::_Exit(3);
   }
   if (what == "flood") return flood();

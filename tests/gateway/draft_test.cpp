@@ -185,6 +185,22 @@ TEST_F(Drafts, AnEarlierSampleOfTheSourceIsNotTakenForTheDraft) {
   EXPECT_EQ(sender_.sent_drafts, 1);
 }
 
+// A source that is opened again counts from the beginning.
+TEST_F(Drafts, NorIsOneOfItsPredecessorThatHasItsNumber) {
+  const Read stop =
+      read_dds("<in topic='/stop' type='a/msg/B' port='/Stop/cmd:o' max_size='128KiB'/>");
+  {
+    Incoming predecessor(node_, stop.entry(), nav_account_);
+    predecessor.deliver(BytesSample(large('a')), Time::max());
+  }
+  Incoming successor(node_, stop.entry(), nav_account_);
+  ins_.emplace("/Stop/cmd:o", &successor);
+  successor.follow(outgoing_);
+  successor.deliver(BytesSample(large('b')), Time::max());
+  EXPECT_THAT(sender_.sent, ElementsAre(large('a'), large('b')));
+  EXPECT_EQ(sender_.sent_drafts, 1);
+}
+
 // What overrides it while the first of the two is sent, overrides it.
 TEST_F(Drafts, ASampleThatIsOverriddenBeforeItIsTakenIsNotSent) {
   auto stop = node_.output_port("/Stop/cmd:o", Type::variable("a/msg/B", kSize));
@@ -207,6 +223,21 @@ TEST_F(Drafts, ADraftThatCannotBeSentAtOnceIsLeftToTheLoop) {
   EXPECT_THAT(sender_.sent, ElementsAre(large('a')));
   EXPECT_EQ(sender_.sent_drafts, 0);
   EXPECT_EQ(sender_.dropped_drafts, 1);
+}
+
+// What comes next is sent as it is.
+TEST_F(Drafts, ADraftThatGrowsTooOldUntilTheLoopComesIsDropped) {
+  sender_.would_wait = true;
+  deliver(large('a'));
+  sender_.would_wait = false;
+  ages_.age = 0;
+  outgoing_.run(shm::monotonic_now());
+  EXPECT_EQ(sender_.dropped_drafts, 1);
+  ages_.age = shm::kForever;
+  sender_.largest = 1;  // not straight on
+  deliver(large('b'));
+  outgoing_.run(shm::monotonic_now());
+  EXPECT_THAT(sender_.sent, ElementsAre(large('b')));
 }
 
 }  // namespace

@@ -58,6 +58,18 @@ TEST_F(Leaving, WhatWinsIsSent) {
   EXPECT_EQ(outgoing_.next(), shm::kForever) << "somebody commands";
 }
 
+class LeavingFew : public Leaving {
+ protected:
+  LeavingFew() : Leaving("queue='2'") {}
+};
+
+TEST_F(LeavingFew, AsManyWaitAsTheMappingSays) {
+  auto nav = publisher();
+  for (const char* const each : {"one", "two", "three"}) publish(nav, each);
+  outgoing_.run(now_);
+  EXPECT_THAT(sender_.sent, ElementsAre("two", "three"));
+}
+
 TEST_F(Leaving, AnIdlePortSaysStopAtOnceAndAgainEvery100Milliseconds) {
   outgoing_.run(now_);
   EXPECT_THAT(sender_.sent, ElementsAre(kZeros)) << "at the start";

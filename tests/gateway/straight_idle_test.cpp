@@ -1,12 +1,16 @@
 // A port that becomes idle while samples go straight on: the loop, which alone says so to its
 // readers, hears of it whoever has the turn.
 #include <gmock/gmock.h>
+#include <unistd.h>
 
+#include <atomic>
+#include <fstream>
 #include <string>
 #include <thread>
 
 #include "shm/clock.hpp"
 #include "tests/gateway/straight_scene.hpp"
+#include "tests/support/await.hpp"
 
 namespace arbiter::gateway {
 namespace {
@@ -35,6 +39,35 @@ class StraightWithALock : public Straight {
 
   OutputPort<void> lock_ = node_.output_port("/EStop/released:o", Type::untyped(1));
 };
+
+bool sleeps(pid_t thread) {
+  std::string line;
+  std::getline(std::ifstream("/proc/self/task/" + std::to_string(thread) + "/stat"), line);
+  const auto end = line.rfind(") ");
+  return end != std::string::npos && line.substr(end + 2, 1) == "S";
+}
+
+// A publisher that never rests would leave it none. Here the loop has an idle sample to send, and
+// is not done with it before it may be.
+TEST_F(StraightWithALock, ALoopThatWaitsForItsTurnHasTheNext) {
+  std::atomic<pid_t> waiting = 0;
+  std::atomic<bool> may_end = false;
+  ASSERT_TRUE(outgoing_.begin_turn(1));
+  sender_.meanwhile = [&] { test::await([&] { return may_end.load(); }); };
+  std::thread loop([&] {
+    waiting = ::gettid();
+    outgoing_.run(shm::monotonic_now() + Outgoing::kIdlePeriod);
+  });
+  test::await([&] { return waiting != 0 && sleeps(waiting); });
+  outgoing_.end_turn("/Nav/cmd:o", shm::kForever);
+  const bool has_another = outgoing_.begin_turn(1);
+  if (has_another) outgoing_.end_turn("/Nav/cmd:o", shm::kForever);
+  may_end = true;
+  loop.join();
+  EXPECT_FALSE(has_another);
+  EXPECT_TRUE(outgoing_.begin_turn(1));
+  outgoing_.end_turn("/Nav/cmd:o", shm::kForever);
+}
 
 // While a thread has the turn the port rings for nobody.
 TEST_F(StraightWithALock, APortThatBecomesIdleInATurnIsLeftToTheLoop) {

@@ -6,8 +6,10 @@
 #include <signal.h>
 #include <unistd.h>
 
+#include <deque>
 #include <fstream>
 #include <string>
+#include <string_view>
 
 #include "gateway/core/life_signs.hpp"
 #include "shm/file_descriptor.hpp"
@@ -16,32 +18,56 @@
 namespace arbiter::gateway {
 namespace {
 
-using test::Spoken;
+using testing::EndsWith;
 using testing::HasSubstr;
 using testing::StartsWith;
 
-// In milliseconds: how long a worker may be silent, and how long it may take to end.
-Spoken supervised(const std::string& mode, int silence, int end) {
-  return Spoken(
-      {ARBITER_TESTS "/supervised_program", mode, std::to_string(silence), std::to_string(end)});
-}
+// The two processes. What they say, to the log, and what they print are told apart: what is said
+// may come a little later.
+class Supervised {
+ public:
+  // In milliseconds: how long a worker may be silent, and how long it may take to end.
+  Supervised(const std::string& mode, int silence, int end)
+      : program_({ARBITER_TESTS "/supervised_program", mode, std::to_string(silence),
+                  std::to_string(end)}) {}
 
-pid_t next_worker(Spoken& program) {
-  const std::string line = program.line().value_or("");
-  EXPECT_THAT(line, StartsWith("worker "));
-  return line.size() > 7 ? std::stoi(line.substr(7)) : 0;
-}
-
-// Where a worker may be so slow to begin that it is killed: one that was not before it spoke.
-pid_t next_worker_that_is_let_begin(Spoken& program) {
-  bool is_killed = false;
-  while (const auto line = program.line()) {
-    if (line->starts_with("worker ") && !is_killed) return std::stoi(line->substr(7));
-    is_killed = line->find("the worker hangs") != std::string::npos;
+  // The next line; empty: none comes.
+  std::string said() { return next(said_); }
+  std::string printed() { return next(printed_); }
+  // That has begun. One may be so slow that it is killed before.
+  pid_t next_worker() {
+    constexpr std::string_view kWorker = "worker ";
+    for (std::string line; !(line = printed()).empty();) {
+      if (line.starts_with(kWorker)) return std::stoi(line.substr(kWorker.size()));
+    }
+    ADD_FAILURE() << "no worker has begun";
+    return 0;
   }
-  ADD_FAILURE() << "no worker has begun";
-  return 0;
-}
+  // Whether something is said that has this in it; what comes before is dropped.
+  bool says(const std::string& text) {
+    for (std::string line; !(line = said()).empty();) {
+      if (line.find(text) != std::string::npos) return true;
+    }
+    return false;
+  }
+  test::ChildProcess& process() { return program_.process; }
+
+ private:
+  using Lines = std::deque<std::string>;
+  std::string next(Lines& wanted) {
+    while (wanted.empty()) {
+      const auto line = program_.line();
+      if (!line) return "";
+      (line->starts_with("arbiter-gateway: ") ? said_ : printed_).push_back(*line);
+    }
+    std::string line = wanted.front();
+    wanted.pop_front();
+    return line;
+  }
+
+  test::Spoken program_;
+  Lines said_, printed_;
+};
 
 std::string state_of(pid_t process) {
   std::string line;
@@ -59,64 +85,63 @@ void wait_until_ended(pid_t process) {
 constexpr int kLong = 600'000;
 
 TEST(Supervisor, KillsAWorkerThatHangsAndStartsAnother) {
-  Spoken program = supervised("hang", 200, kLong);
-  const pid_t first = next_worker_that_is_let_begin(program);
-  EXPECT_THAT(program.line().value_or(""),
-              HasSubstr("the worker hangs (no sign of life for 200 ms"));
-  EXPECT_EQ(program.line(), "cleaned up after " + std::to_string(first));
-  EXPECT_THAT(program.line().value_or(""), HasSubstr("was ended by signal 9 (Killed); another"));
-  const pid_t second = next_worker_that_is_let_begin(program);
+  Supervised program("hang", 200, kLong);
+  const pid_t first = program.next_worker();
+  EXPECT_EQ(program.printed(), "cleaned up after " + std::to_string(first));
+  EXPECT_TRUE(program.says("the worker hangs (no sign of life for 200 ms"));
+  EXPECT_THAT(program.said(), HasSubstr("was ended by signal 9 (Killed); another"));
+  const pid_t second = program.next_worker();
   EXPECT_NE(second, first);
   ASSERT_GT(second, 0);
-  program.process.kill();
+  program.process().kill();
   ::kill(second, SIGKILL);  // it would hang on for its ten minutes
 }
 
 TEST(Supervisor, KillsAWorkerThatDoesNotEndWhenItIsAskedTo) {
-  Spoken program = supervised("beat", kLong, 100);
-  const pid_t worker = next_worker(program);
-  EXPECT_EQ(program.line(), "beats");
-  program.process.signal(SIGTERM);
-  EXPECT_THAT(program.line().value_or(""), HasSubstr("did not end within 100 ms: killing it"));
-  EXPECT_EQ(program.line(), "cleaned up after " + std::to_string(worker));
-  EXPECT_EQ(program.process.wait(), 0);
+  Supervised program("beat", kLong, 100);
+  const pid_t worker = program.next_worker();
+  EXPECT_EQ(program.printed(), "beats");
+  program.process().signal(SIGTERM);
+  EXPECT_THAT(program.said(), HasSubstr("did not end within 100 ms: killing it"));
+  EXPECT_EQ(program.printed(), "cleaned up after " + std::to_string(worker));
+  EXPECT_EQ(program.process().wait(), 0);
 }
 
 // Somebody looks into it, with a debugger or by SIGSTOP.
 TEST(Supervisor, LeavesAWorkerAloneThatIsStopped) {
-  Spoken program = supervised("beat", 4000, 100);
-  const pid_t worker = next_worker(program);
-  EXPECT_EQ(program.line(), "beats");
+  Supervised program("beat", 4000, 100);
+  const pid_t worker = program.next_worker();
+  EXPECT_EQ(program.printed(), "beats");
   ::kill(worker, SIGSTOP);
-  EXPECT_THAT(program.line().value_or(""), HasSubstr("the worker is stopped: it is left alone"));
-  program.process.signal(SIGTERM);
-  EXPECT_THAT(program.line().value_or(""), HasSubstr("did not end"));
-  EXPECT_EQ(program.line(), "cleaned up after " + std::to_string(worker));
+  EXPECT_THAT(program.said(), HasSubstr("the worker is stopped: it is left alone"));
+  program.process().signal(SIGTERM);
+  EXPECT_THAT(program.said(), HasSubstr("did not end"));
+  EXPECT_EQ(program.printed(), "cleaned up after " + std::to_string(worker));
 }
 
 // It asks for the mapping to be read again, which is the supervisor's business.
 TEST(Supervisor, AWorkerThatHasOnlyBegunIsNotEndedBySigusr1) {
-  Spoken program = supervised("signalled", kLong, 100);
-  next_worker(program);
-  EXPECT_EQ(program.line(), "beats");
+  Supervised program("signalled", kLong, 100);
+  program.next_worker();
+  EXPECT_EQ(program.printed(), "beats");
 }
 
 // It is asked to by SIGTERM, which it does not heed.
 TEST(Supervisor, AWorkerThatHangsEndsWithoutItsSupervisor) {
-  Spoken program = supervised("hang", kLong, 100);
-  const pid_t worker = next_worker(program);
-  program.process.kill();
-  EXPECT_THAT(program.line().value_or(""),
+  Supervised program("hang", kLong, 100);
+  const pid_t worker = program.next_worker();
+  program.process().kill();
+  EXPECT_THAT(program.said(),
               HasSubstr("the supervisor has ended, but the worker did not end within 100 ms: "));
-  EXPECT_EQ(program.line(), "cleaned up after " + std::to_string(worker));
+  EXPECT_EQ(program.printed(), "cleaned up after " + std::to_string(worker));
   wait_until_ended(worker);
 }
 
 TEST(Supervisor, AWorkerWhoseSupervisorLivesIsNotEnded) {
-  Spoken program = supervised("hang", kLong, 0);
-  next_worker(program);
-  program.process.signal(SIGTERM);
-  EXPECT_THAT(program.line().value_or(""), HasSubstr("did not end within 0 s: killing it"));
+  Supervised program("hang", kLong, 0);
+  program.next_worker();
+  program.process().signal(SIGTERM);
+  EXPECT_THAT(program.said(), HasSubstr("did not end within 0 s: killing it"));
 }
 
 TEST(Supervisor, APipeHasItsReaderUntilItIsClosed) {
@@ -161,29 +186,25 @@ TEST(LifeSigns, TimeInWhichNobodyLookedDoesNotCount) {
   EXPECT_TRUE(signs.hangs(1'000'100, runs));
 }
 
-// How it ended, and when the next one is started.
-std::string next_end(Spoken& program) {
-  EXPECT_THAT(program.line().value_or(""), StartsWith("cleaned up after"));
-  const std::string line = program.line().value_or("");
-  const auto begin = line.find("the worker ");
-  return begin == std::string::npos ? line : line.substr(begin + 11);
-}
-
 // Its lines must not fill the log: what it has said will hardly change by itself.
 TEST(Supervisor, AWorkerThatFailsAgainAndAgainIsStartedEverMoreSeldom) {
-  Spoken program = supervised("fail", kLong, 100);
+  Supervised program("fail", kLong, 100);
   for (const std::string pause : {"2", "4", "8", "16", "16"}) {
-    EXPECT_EQ(next_end(program),
-              "ended with exit code 1; another one is started in " + pause + " ms");
+    EXPECT_THAT(program.printed(), StartsWith("cleaned up after"));
+    EXPECT_THAT(program.said(), EndsWith("the worker ended with exit code 1; another one is "
+                                         "started in " +
+                                         pause + " ms"));
   }
 }
 
 // It is killed with the middleware's daemon, say, which may be back at once.
 TEST(Supervisor, AWorkerThatIsKilledAgainAndAgainIsSoonThereAgain) {
-  Spoken program = supervised("crash", kLong, 100);
+  Supervised program("crash", kLong, 100);
   for (const std::string pause : {"2", "4", "4", "4"}) {
-    EXPECT_EQ(next_end(program),
-              "was ended by signal 9 (Killed); another one is started in " + pause + " ms");
+    EXPECT_THAT(program.printed(), StartsWith("cleaned up after"));
+    EXPECT_THAT(program.said(), EndsWith("the worker was ended by signal 9 (Killed); another one "
+                                         "is started in " +
+                                         pause + " ms"));
   }
 }
 
