@@ -8,6 +8,8 @@
 #include <cstring>
 #include <utility>
 
+#include "shm/clock.hpp"
+
 namespace arbiter::wire {
 namespace {
 
@@ -66,8 +68,14 @@ SendResult send_message(int socket, const Message& message,
     part->cmsg_len = CMSG_LEN(sizeof(int) * count);
     std::memcpy(CMSG_DATA(part), descriptors.data(), sizeof(int) * count);
   }
+  shm::Nanoseconds give_up = 0;  // each try has all of the socket's time (SO_SNDTIMEO)
   while (sendmsg(socket, &header, MSG_NOSIGNAL) < 0) {
-    if (errno == EINTR) continue;
+    if (errno == EINTR) {
+      const shm::Nanoseconds now = shm::monotonic_now();
+      if (give_up == 0) give_up = now + kMaxWaitToSend * 1'000'000'000LL;
+      if (now < give_up) continue;
+      return SendResult::kFull;
+    }
     if (errno == EAGAIN || errno == ENOBUFS) return SendResult::kFull;
     if (errno == ETOOMANYREFS) return SendResult::kTooMany;
     return SendResult::kClosed;

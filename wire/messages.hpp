@@ -181,7 +181,11 @@ struct Received {
 enum class SendResult { kSent, kFull, kTooMany, kClosed };
 enum class ReceiveResult { kReceived, kNothing, kClosed, kMalformed };
 
-// Non-blocking unless the socket blocks. Never raises SIGPIPE. What is received is all that came:
+// What a call may wait at a socket that blocks, in seconds.
+inline constexpr int kMaxWaitToSend = 1;
+
+// Non-blocking unless the socket blocks; signals, too, may interrupt that for kMaxWaitToSend only.
+// Never raises SIGPIPE. What is received is all that came:
 // descriptors that the kernel finds no room for, it closes before recvmsg() returns, and to close a
 // stranger's may block. So there is room for as many as there can be.
 [[nodiscard]] SendResult send_message(int socket, const Message& message,

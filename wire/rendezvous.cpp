@@ -17,6 +17,8 @@
 #include <stdexcept>
 #include <system_error>
 
+#include "wire/messages.hpp"
+
 namespace arbiter::wire {
 namespace {
 
@@ -104,7 +106,7 @@ shm::FileDescriptor make_socket() {
   shm::FileDescriptor made(socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0));
   if (!made) fail("cannot make a socket");
   // A daemon that is stopped holds nobody up for longer than this, be it in connect() or sendmsg().
-  const timeval limit{1, 0};
+  const timeval limit{kMaxWaitToSend, 0};
   setsockopt(made.get(), SOL_SOCKET, SO_SNDTIMEO, &limit, sizeof limit);
   return made;
 }

@@ -3,7 +3,9 @@
 #include <dirent.h>
 #include <fcntl.h>
 #include <gtest/gtest.h>
+#include <signal.h>
 #include <sys/socket.h>
+#include <sys/time.h>
 #include <unistd.h>
 
 #include <cstddef>
@@ -202,6 +204,25 @@ TEST(Message, ATextThatIsTooLongForAMessageIsCutBetweenTwoCharacters) {
   EXPECT_EQ(message.text_view(), text);
   message.set_text(text + "y\u00e4");
   EXPECT_EQ(message.text_view(), text + "y");
+}
+
+// As a profiler's timer does it all the time.
+TEST_F(Wire, SignalsDoNotPutOffForEverThatNobodyReads) {
+  const timeval limit{kMaxWaitToSend, 0};
+  ASSERT_EQ(setsockopt(sender_.get(), SOL_SOCKET, SO_SNDTIMEO, &limit, sizeof limit), 0);
+  while (send_message(sender_.get(), {}) == SendResult::kSent) {
+  }
+  ASSERT_EQ(fcntl(sender_.get(), F_SETFL, 0), 0) << "it blocks from now on";
+  struct sigaction ignoring {};
+  struct sigaction before {};
+  ignoring.sa_handler = [](int) {};
+  ASSERT_EQ(sigaction(SIGALRM, &ignoring, &before), 0);
+  itimerval often{{0, 50'000}, {0, 50'000}};
+  ASSERT_EQ(setitimer(ITIMER_REAL, &often, nullptr), 0);
+  EXPECT_EQ(send_message(sender_.get(), {}), SendResult::kFull);
+  often = {};
+  setitimer(ITIMER_REAL, &often, nullptr);
+  sigaction(SIGALRM, &before, nullptr);
 }
 
 }  // namespace
