@@ -123,7 +123,7 @@ void Daemon::run(int signal_descriptor) {
     admit_clients();
     give_turns();
     const shm::Nanoseconds now = shm::monotonic_now();
-    barriers_.expire(now);
+    for (const ClientId late : barriers_.expire(now)) note_late(late, now);
     introductions_.advance(now);
     look_after_the_loop(now);
     takeover_.advance(now);

@@ -111,6 +111,8 @@ class Daemon final : private Takeover::Host {
   void close_all(Client& client) override;
   void log_end_of(const Client& client, bool is_away);
   void drop_oldest_silent_client();
+  // That it is waited for no longer, for the log.
+  void note_late(ClientId id, shm::Nanoseconds now);
   void look_in_flight(shm::Nanoseconds now);
   void plan_to_look_in_flight();
 

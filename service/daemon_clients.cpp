@@ -31,6 +31,8 @@ constexpr shm::Nanoseconds kLookInFlightAfter = 5'000'000;
 constexpr unsigned kMostDoublings = 5;
 // The same where nobody does, but what was left unread still counts.
 constexpr shm::Nanoseconds kLookLeftUnreadAfter = 1'000'000'000;
+// How often the log has it that a client is late.
+constexpr shm::Nanoseconds kTellLateEvery = 60'000'000'000;
 
 // How many connections are taken out of the kernel's queue in one round.
 constexpr int kMaxAcceptedAtOnce = 64;
@@ -160,6 +162,19 @@ void Daemon::drop(ClientId id) {
   observers_.forget(id);
   barriers_.forget(id);
   left_unread_.add(client->release_unread());
+}
+
+// It finds nothing of who has opened a port meanwhile. Whoever is stopped is late again and again.
+void Daemon::note_late(ClientId id, shm::Nanoseconds now) {
+  Client* const client = clients_.find(id);
+  if (client == nullptr) return;
+  if (client->late_told_at != 0 && now - client->late_told_at < kTellLateEvery) return;
+  client->late_told_at = now;
+  const LogAccount account(client->user());
+  log::warn(
+      "{} has not answered for 0.2 s, and is not waited for: it is stopped, or its service "
+      "thread has not run; until it does, it gets nothing of ports that open",
+      client->description());
 }
 
 void Daemon::look_in_flight(shm::Nanoseconds now) {

@@ -59,14 +59,18 @@ class Barriers {
     return next;
   }
 
-  void expire(shm::Nanoseconds now) {
+  // Returns who is not waited for any longer.
+  std::set<ClientId> expire(shm::Nanoseconds now) {
     std::set<std::uint64_t> numbers;
+    std::set<ClientId> late;
     for (auto& [number, barrier] : barriers_) {
       if (barrier.deadline > now) continue;
+      late.merge(barrier.waiting);
       barrier.waiting.clear();
       numbers.insert(number);
     }
     for (const std::uint64_t number : numbers) pass(number);
+    return late;
   }
 
  private:

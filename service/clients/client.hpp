@@ -114,6 +114,7 @@ class Client {
   KeptPorts to_hand_back;             // these are missing
   bool has_failed_to_return = false;  // one came, and we could not take it
   std::string why_not_returned;       // as the log has it; empty: nothing stood there
+  shm::Nanoseconds late_told_at = 0;  // when the log had that it is late; 0: never
   bool has_turn = false;              // waits for its turn to be served
   bool is_last_turn = false;          // for its process has ended
   int last_turns = 0;                 // that it has had since

@@ -71,6 +71,7 @@ struct OutputPort {
   Description described;             // by its component
   bool yields = false;               // to another component that asks for its name
   bool is_asked_to_yield = false;    // one has asked
+  bool has_returned = false;         // and has not been connected (link_one()) since
   Charge charge;
 
   ~OutputPort();
@@ -92,6 +93,7 @@ struct InputPort {
   bool is_told_unmentioned = false;
   bool is_known_blind = false;
   Description described;
+  bool has_returned = false;
   Charge charge;
 
   ~InputPort();

@@ -183,16 +183,24 @@ Switchboard::Told Switchboard::link_all(const shm::TableView& table) {
 Switchboard::Told Switchboard::link_one(const shm::TableView& table, shm::PortInstance port) {
   Told told;
   Wanted wanted;
+  bool has_returned = false;
   if (const auto input = inputs_.find(port); input != inputs_.end()) {
+    has_returned = std::exchange(input->second->has_returned, false);
     send_pages(*input->second->client, input->second->name->id, table, told);
     want_links(*input->second, table, wanted);
   }
   if (const auto output = outputs_.find(port); output != outputs_.end()) {
+    has_returned = std::exchange(output->second->has_returned, false);
     send_pages(*output->second, table, told);
     want_links(*output->second, table, wanted);
     taps_.link(table, *output->second, [&](Client* client) { told.insert(client); });
   }
   make_links(wanted, told);
+  if (has_returned) {
+    for (const LinkKey& key : links_of(port)) {
+      if (is_connected(key)) told.insert({&client_of(key.first), &client_of(key.second)});
+    }
+  }
   return told;
 }
 

@@ -67,7 +67,9 @@ class Switchboard {
   void forget_away(const KeptPorts& ports);
 
   // Sends the pages, and makes the links, that a table asks for: all of them, or those of one
-  // port. Links that it does not ask for any more stay until unlink().
+  // port. Links that it does not ask for any more stay until unlink(). Of a port that has come back
+  // while it was being opened, link_one() tells those, too, with whom it was linked then: nobody
+  // has waited for them.
   Told link_all(const shm::TableView& table);
   Told link_one(const shm::TableView& table, shm::PortInstance port);
   Told unlink(const shm::TableView& table);

@@ -41,6 +41,7 @@ Charge Switchboard::set_away(shm::PortInstance port) {
 OutputPort& Switchboard::readmit(std::unique_ptr<OutputPort> port, Client& client, Source& source) {
   OutputPort& readmitted = *port;
   port->instance = source.away;
+  port->has_returned = true;
   insert(std::move(port), client, source);
   return readmitted;
 }
@@ -48,6 +49,7 @@ OutputPort& Switchboard::readmit(std::unique_ptr<OutputPort> port, Client& clien
 InputPort& Switchboard::readmit(std::unique_ptr<InputPort> port, Client& client, InputName& name) {
   InputPort& readmitted = *port;
   port->instance = name.away;
+  port->has_returned = true;
   insert(std::move(port), client, name);
   return readmitted;
 }

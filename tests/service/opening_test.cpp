@@ -129,5 +129,78 @@ TEST(Introductions, ShowASegmentOnceItsOwnPublisherHasMadeRoom) {
   EXPECT_EQ(receiver.expect(MessageKind::kOutputGrown).message.peer, slow_port);
 }
 
+// How often it was asked to take up what came after the last output port that it was shown.
+int syncs_after_last_peer(RawClient& receiver) {
+  receiver.send(RawClient::message(MessageKind::kStatus));
+  int syncs = 0;
+  for (wire::Received received; receiver.receive(received);) {
+    if (received.message.kind == MessageKind::kOutputPeer) syncs = 0;
+    if (received.message.kind == MessageKind::kSync) ++syncs;
+    if (received.message.kind == MessageKind::kStatusReply) break;
+  }
+  return syncs;
+}
+
+// Or samples would wait in a queue that the receiver does not know yet.
+TEST(Introductions, OfAPortThatComesBackWhileItIsOpenedAreWaitedFor) {
+  Daemon daemon(single_model());
+  const auto segment = raw_output_segment();
+  const auto inbox = raw_input_segment();
+  const shm::Bell bell;
+  RawClient receiver(daemon.instance());
+  receiver.hello("receiver", wire::kHasServiceThread);
+  receiver.send(RawClient::message(MessageKind::kOpenInput, "/in"),
+                {inbox.get(), bell.write_end().get()});
+  receiver.expect(MessageKind::kConnected);
+  RawClient sender(daemon.instance());
+  const auto welcome = sender.hello("sender", wire::kHasServiceThread | wire::kComesBack);
+  sender.send(RawClient::message(MessageKind::kOpenOutput, "/out"), {segment.get(), -1});
+  const auto opened = sender.expect(MessageKind::kOpened);
+  answer_sync(receiver, receiver.expect(MessageKind::kSync).message);
+  sender = RawClient(daemon.instance());
+  auto hello = RawClient::hello_message(
+      "sender", wire::kHasServiceThread | wire::kComesBack | wire::kRejoins);
+  hello.link = welcome.message.link;
+  sender.send(hello, {welcome.descriptors[0].get(), welcome.descriptors[1].get()});
+  auto output = RawClient::message(MessageKind::kHandBackOutput, "/out");
+  output.port = opened.message.port;
+  output.id = opened.message.id;
+  sender.send(output, {segment.get(), opened.descriptors[0].get()});
+  sender.send(RawClient::message(MessageKind::kHandedBack));
+  sender.expect(MessageKind::kInputPeer);
+  RawClient other(daemon.instance());  // whose opening has segments shown that are new
+  other.hello("other");
+  open_in_step(other, "/other", segment);
+  auto connect = RawClient::message(MessageKind::kConnect);
+  connect.port = opened.message.port;
+  sender.send(connect);
+  sender.expect(MessageKind::kConnected);
+  EXPECT_EQ(syncs_after_last_peer(receiver), 2) << "for the other's, and for its own";
+}
+
+TEST(Introductions, SayInTheLogOnceForWhomTheyDoNotWait) {
+  Daemon daemon(single_model());
+  const auto segment = raw_output_segment();
+  const auto inbox = raw_input_segment();
+  const shm::Bell bell;
+  RawClient receiver(daemon.instance());
+  receiver.hello("late", wire::kHasServiceThread);
+  receiver.send(RawClient::message(MessageKind::kOpenInput, "/in"),
+                {inbox.get(), bell.write_end().get()});
+  receiver.expect(MessageKind::kConnected);
+  for (int times = 0; times < 2; ++times) {
+    RawClient sender(daemon.instance());
+    sender.hello();
+    open_in_step(sender, "/out", segment);
+  }
+  daemon.terminate();
+  const std::string log = daemon.log();
+  const std::string late = " has not answered for 0.2 s, and is not waited for: ";
+  const auto told = log.find(late);
+  ASSERT_NE(told, std::string::npos) << log;
+  EXPECT_NE(log.rfind("node \"late\" (pid ", told), std::string::npos) << log;
+  EXPECT_EQ(log.find(late, told + 1), std::string::npos) << log;
+}
+
 }  // namespace
 }  // namespace arbiter::test
