@@ -5,6 +5,7 @@
 #include <set>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include <nlohmann/json.hpp>
@@ -34,19 +35,30 @@ void write_in_force(const wire::ChangeReport& report) {
   }
 }
 
-// Ports that somebody has open, and that get nothing by this model.
-void write_unmentioned(const std::string& verb, const std::string& instance) {
+// Those of the input ports that somebody has open, after a text that says what is wrong with them.
+void write_open(const std::string& verb, const std::string& instance, const char* what,
+                const auto& is_wrong) {
   std::vector<std::string> names;
   try {
     for (const wire::InputStatus& port : fetch_status(verb, instance).inputs) {
-      if (port.open && !port.mentioned) names.push_back(port.name);
+      if (port.open && is_wrong(port)) names.push_back(port.name);
     }
   } catch (const wire::CallError&) {
     return;  // who may change the model need not be allowed to observe
   }
-  if (names.empty()) return;
-  std::cout << "  open, but not mentioned by this model, so that no sample arrives: "
-            << rules::enumerate(names) << '\n';
+  if (!names.empty()) std::cout << "  " << what << ": " << rules::enumerate(names) << '\n';
+}
+
+// Ports that the model in force has and the files lack, by the report of a dry run.
+std::set<std::string> dropped_ports(const nlohmann::json& report) {
+  std::set<std::string> ports;
+  for (const auto& model : report.at("models")) {
+    if (!model.at("in_force").get<bool>() || model.at("changes").is_null()) continue;
+    for (const auto& port : model.at("changes").at("diff").at("ports")) {
+      if (!port.at("after").at("exists").get<bool>()) ports.insert(port.at("port"));
+    }
+  }
+  return ports;
 }
 
 void add_files(const wire::LoadedModelStatus& model, std::set<std::string>& files) {
@@ -105,16 +117,18 @@ void name_files_from_here(wire::ChangeReport& report, const nlohmann::json& docu
 }  // namespace
 
 wire::ChangeReport ask_for_change(const std::string& verb, const std::string& instance,
-                                  wire::Message question, bool json) {
+                                  wire::Message question, bool json, nlohmann::json* whole) {
   question.flags |= wire::kWantsReport;
   wire::Call daemon(caller(verb, instance));
   const std::string text = wire::change_report_text(daemon.ask(question));
   wire::ChangeReport report = wire::read_change_report(text);
+  nlohmann::json document = wire::parse_document(text);
   if (json) {
-    std::cout << wire::write_document(wire::parse_document(text));
+    std::cout << wire::write_document(document);
     return report;
   }
-  name_files_from_here(report, wire::parse_document(text), verb, instance);
+  name_files_from_here(report, document, verb, instance);
+  if (whole != nullptr) *whole = std::move(document);
   std::cerr << report.text;
   if (report.has_errors) {
     std::cerr << "arbiter: refused; nothing has changed\n";
@@ -124,13 +138,25 @@ wire::ChangeReport ask_for_change(const std::string& verb, const std::string& in
   return report;
 }
 
+void write_dropped(const std::string& verb, const std::string& instance,
+                   const nlohmann::json& report) {
+  const std::set<std::string> dropped = dropped_ports(report);
+  if (dropped.empty()) return;
+  write_open(verb, instance,
+             "open now, and not mentioned by these files, so that no sample would arrive",
+             [&](const wire::InputStatus& port) { return dropped.contains(port.name); });
+}
+
 int change_model(const std::string& verb, const std::string& instance,
                  const wire::Message& question, bool json) {
   const auto report = ask_for_change(verb, instance, question, json);
   if (!report.ok) return 1;
   if (!json) {
     write_in_force(report);
-    if (report.generation.value_or(0) != 0) write_unmentioned(verb, instance);
+    if (report.generation.value_or(0) != 0) {
+      write_open(verb, instance, "open, but not mentioned by this model, so that no sample arrives",
+                 [](const wire::InputStatus& port) { return !port.mentioned; });
+    }
   }
   return 0;
 }

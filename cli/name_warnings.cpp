@@ -11,8 +11,8 @@ namespace arbiter::cli {
 namespace {
 
 constexpr std::size_t kMaxShown = 4;
-constexpr std::array<std::string_view, 5> kCodes{"matches-nothing", "never-published", "never-read",
-                                                 "similar-name", "wrong-end"};
+constexpr std::array<std::string_view, 6> kCodes{"matches-nothing", "never-published", "never-read",
+                                                 "pattern-as-name", "similar-name",    "wrong-end"};
 
 }  // namespace
 

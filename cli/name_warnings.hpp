@@ -11,7 +11,7 @@
 
 namespace arbiter::cli {
 
-// Those of `found`: never-published, never-read, similar-name, wrong-end and
+// Those of `found`: never-published, never-read, pattern-as-name, similar-name, wrong-end and
 // matches-nothing.
 std::vector<rules::Diagnostic> name_warnings(const rules::Diagnostics& found);
 

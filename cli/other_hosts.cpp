@@ -72,6 +72,17 @@ OtherHosts statuses_of_other_hosts(const std::string& instance,
   return others;
 }
 
+std::vector<std::string> others_with_port(const std::string& port, const wire::HostsDocument& hosts,
+                                          const std::string& but) {
+  std::vector<std::string> others;
+  for (const wire::HostStatus& each : hosts.hosts) {
+    const bool has_it =
+        std::find(each.inputs.begin(), each.inputs.end(), port) != each.inputs.end();
+    if (has_it && each.is_up && each.host != but) others.push_back(shm::printable(each.host));
+  }
+  return others;
+}
+
 void write_port_errors(std::ostream& out, const std::optional<wire::HostsDocument>& hosts) {
   if (!hosts) return;
   for (const wire::HostDisagreement& each : hosts->disagreements) {

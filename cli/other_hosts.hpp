@@ -39,6 +39,11 @@ struct OtherHosts {
 [[nodiscard]] OtherHosts statuses_of_other_hosts(const std::string& instance,
                                                  std::chrono::milliseconds patience);
 
+// Further hosts that have the port open: each decides it for its own component.
+[[nodiscard]] std::vector<std::string> others_with_port(const std::string& port,
+                                                        const wire::HostsDocument& hosts,
+                                                        const std::string& but);
+
 // The input ports that are open on several hosts, a line for each.
 void write_port_errors(std::ostream& out, const std::optional<wire::HostsDocument>& hosts);
 

@@ -33,6 +33,11 @@ struct HostSwitch {
   std::uint64_t generation = 0;  // of the model in force there; 0: not known
   std::uint64_t before = 0;      // of that when it prepared
   std::string why;               // of kNotSwitched and kUnknown; for people
+
+  // The model was in force there before: the switch has changed nothing.
+  [[nodiscard]] bool had_it() const {
+    return outcome == Outcome::kSwitched && generation != 0 && generation == before;
+  }
 };
 
 struct SwitchEverywhere {

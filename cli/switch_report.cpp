@@ -52,18 +52,25 @@ void write_text(const SwitchEverywhere& result, const std::string& model) {
   for (const HostSwitch& each : result.hosts) width = std::max(width, each.host.size());
   for (const HostSwitch& each : result.hosts) {
     std::cout << each.host << std::string(width - each.host.size() + 2, ' ')
-              << name_of(each.outcome);
-    if (each.outcome == SwitchOutcome::kSwitched) {
+              << (each.had_it() ? "has it already" : name_of(each.outcome));
+    if (each.had_it()) {
+      std::cout << ": model " << each.generation;
+    } else if (each.outcome == SwitchOutcome::kSwitched) {
       if (each.took != 0) std::cout << " after " << watch::span_text(each.took);
       std::cout << ": model " << each.generation;
     }
     if (!each.why.empty()) std::cout << ": " << each.why;
     std::cout << '\n';
   }
-  if (result.is_committed) {
-    std::cout << rules::counted(result.count(SwitchOutcome::kSwitched), "host") << " switched to \""
-              << model << "\" one by one, within " << watch::span_text(result.interval)
+  const auto had = static_cast<std::size_t>(std::count_if(
+      result.hosts.begin(), result.hosts.end(), [](const auto& each) { return each.had_it(); }));
+  const std::size_t switched = result.count(SwitchOutcome::kSwitched) - had;
+  if (result.is_committed && (switched != 0 || had == 0)) {
+    std::cout << rules::counted(switched, "host") << " switched to \"" << model
+              << "\" one by one, within " << watch::span_text(result.interval)
               << " of the first commit\n";
+  } else if (result.is_committed) {
+    std::cout << "\"" << model << "\" was in force already, so nothing has changed\n";
   }
   say_what_lacks(result, model);
 }
@@ -75,6 +82,7 @@ void write_json(const SwitchEverywhere& result, const std::string& model) {
                      {"incarnation", each.incarnation},
                      {"outcome", name_of(each.outcome)},
                      {"prepared", each.has_prepared},
+                     {"already", each.had_it()},
                      {"took", each.took},
                      {"generation", each.generation},
                      {"why", each.why}});

@@ -8,6 +8,7 @@
 
 #include "cli/model_report.hpp"
 #include "cli/name_warnings.hpp"
+#include "cli/other_hosts.hpp"
 #include "cli/why_imports.hpp"
 #include "cli/why_report.hpp"
 #include "cli/why_summary.hpp"
@@ -27,6 +28,33 @@ constexpr std::size_t kMaxTold = 8;
 // Where there is something to say of more than kMaxTold: of so many it is said one by one.
 constexpr std::size_t kMaxTakenApart = 3;
 
+// Whoever asks about a source is told at which ports it matters.
+void refuse_source(const std::string& name, watch::Instance& instance) {
+  if (instance.find_port(name)) return;
+  const wire::Status status = instance.status();
+  if (status.find_source(name) == nullptr) return;
+  const auto has_it = [&](const auto& each) { return each.source == name; };
+  std::vector<std::string> connected, read;
+  for (const wire::InputStatus& input : status.inputs) {
+    if (std::any_of(input.connections.begin(), input.connections.end(), has_it)) {
+      connected.push_back(input.name);
+    } else if (std::any_of(input.senses.begin(), input.senses.end(), has_it)) {
+      read.push_back(input.name);
+    }
+  }
+  if (connected.empty() && read.empty()) return;
+  std::string text = name + " is an output port";
+  if (!connected.empty()) text += ", connected to " + rules::enumerate(connected);
+  if (!read.empty()) text += ", read at " + rules::enumerate(read);
+  throw watch::WatchError(text + "; give the input port first: arbiter why " +
+                          (connected.empty() ? read : connected).front() + ' ' + name);
+}
+
+bool is_open_in(const wire::Status& status, const std::string& port) {
+  const wire::InputStatus* const input = status.find_input(port);
+  return input != nullptr && (input->open || input->away_pid);
+}
+
 // The winner first, then who would like to win.
 int rank(const ConnectionExplanation& connection) {
   return connection.wins ? 0 : connection.is_active ? 1 : 2;
@@ -36,7 +64,7 @@ int rank(const ConnectionExplanation& connection) {
 
 WhyAnswer::WhyAnswer(const WhyOptions& options, const watch::Port& port, Look look,
                      rules::PortExplanation explanation, const wire::Status& status,
-                     watch::Fates fates, std::ostream& out)
+                     watch::Fates fates, std::vector<std::string> also_open_on, std::ostream& out)
     : out_(out),
       options_(options),
       port_(port),
@@ -44,6 +72,8 @@ WhyAnswer::WhyAnswer(const WhyOptions& options, const watch::Port& port, Look lo
       explanation_(std::move(explanation)),
       obstacles_(status, port.name(), look_.sources, port.known_sources(), port.known_ports(),
                  std::move(fates)),
+      also_open_on_(std::move(also_open_on)),
+      is_open_(is_open_in(status, port.name())),
       tenure_(
           rules::tenure_of(look_.table(), port.id(), look_.winner,
                            {look_.sources.now(), port.model().since(port.name()),
@@ -192,6 +222,7 @@ void WhyAnswer::write_json() const {
                    {"nothing_comes_of_it", nullptr},
                    {"since", nullptr},
                    {"obstacles", obstacles_json(obstacles_.of_port())},
+                   {"also_open_on", also_open_on_},
                    {"connections", json::array()},
                    {"senses", json::array()},
                    {"warnings", to_json(name_warnings(port_.diagnostics()))}};
@@ -220,6 +251,7 @@ void WhyAnswer::write_json() const {
 void write_why(std::ostream& out, const WhyOptions& options,
                const std::shared_ptr<watch::Instance>& instance, const watch::KeptPicture* kept,
                const wire::HostsDocument* hosts, std::shared_ptr<watch::ModelLoader> models) {
+  refuse_source(options.port, *instance);
   watch::Port port(instance, options.port, std::move(models));
   for (;;) {
     Look look = kept == nullptr ? port.look() : port.look_back(*kept);
@@ -229,10 +261,14 @@ void write_why(std::ostream& out, const WhyOptions& options,
     const wire::Status status = instance->status();
     if (kept == nullptr) watch::add_gaps(port, look, status);
     watch::Fates fates;
-    if (hosts != nullptr) fates = fates_elsewhere(options, status, *hosts);
+    std::vector<std::string> also_open_on;
+    if (hosts != nullptr) {
+      fates = fates_elsewhere(options, status, *hosts);
+      also_open_on = others_with_port(options.port, *hosts, hosts->host);
+    }
     const shm::TableSnapshot snapshot = look.picture.snapshot;
     const WhyAnswer answer(options, port, std::move(look), std::move(*explanation), status,
-                           std::move(fates), out);
+                           std::move(fates), std::move(also_open_on), out);
     if (!port.is_whole(snapshot)) continue;  // later models have its place
     answer.check_source();
     if (options.json) {

@@ -27,7 +27,7 @@ class WhyAnswer {
   // Keeps references.
   WhyAnswer(const WhyOptions& options, const watch::Port& port, watch::Look look,
             rules::PortExplanation explanation, const wire::Status& status, watch::Fates fates,
-            std::ostream& out);
+            std::vector<std::string> also_open_on, std::ostream& out);
 
   // Throws Error where the source is none of this port's.
   void check_source() const;
@@ -65,6 +65,8 @@ class WhyAnswer {
   const watch::Look look_;
   const rules::PortExplanation explanation_;
   const watch::Obstacles obstacles_;
+  const std::vector<std::string> also_open_on_;  // hosts
+  const bool is_open_;                           // here
   const rules::Tenure tenure_;
   std::vector<rules::ConnectionExplanation> shown_;  // as the model has them
   std::vector<std::string> reasons_;                 // sources that keep active connections out

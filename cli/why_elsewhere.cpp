@@ -1,6 +1,5 @@
 #include "cli/why_elsewhere.hpp"
 
-#include <algorithm>
 #include <cstdint>
 #include <iostream>
 #include <map>
@@ -116,19 +115,12 @@ std::string why_nothing_comes(const wire::Status& status, const wire::InputStatu
   return death.empty() ? why : why + "; " + death;
 }
 
-// The causes in one line each; because of which sources.
 std::vector<std::string> causes_of(const rules::PortExplanation& explanation,
                                    const std::string& source) {
-  std::vector<std::string> causes;
   for (const rules::ConnectionExplanation& each : explanation.connections) {
-    if (each.source != source || each.wins) continue;
-    if (!each.has_rule) causes.emplace_back("no rule lets it win");
-    if (each.earlier) causes.push_back("an earlier rule holds: that of " + *each.earlier);
-    for (const rules::Part& part : each.parts) {
-      for (const rules::Cause& cause : part.causes) causes.push_back(headline(cause));
-    }
+    if (each.source == source) return causes_in_short(each);
   }
-  return causes;
+  return {};
 }
 
 const wire::InputStatus& require_input(const Elsewhere& there, const std::string& port,
@@ -157,19 +149,13 @@ bool is_open_there(const wire::InputStatus& input) { return input.open || input.
 
 json text_or_null(const std::string& text) { return text.empty() ? json(nullptr) : json(text); }
 
-// Of a port that nobody has open there.
 void write_where_it_is_open(std::ostream& out, const Elsewhere& there,
                             const wire::InputStatus& input, const std::string& host) {
-  if (is_open_there(input)) return;
-  if (!input.winner) out << "  ! no component there has the port open: nothing is taken\n";
-  for (const wire::HostStatus& each : there.hosts.hosts) {
-    const auto& inputs = each.inputs;
-    const bool has_it = std::find(inputs.begin(), inputs.end(), input.name) != inputs.end();
-    if (!has_it || !each.is_up || each.host == host) continue;
-    const std::string name = shm::printable(each.host);
-    out << "  ! it is open on host " << name << ", which decides it for its component: arbiter why "
-        << input.name << " --host " << name << '\n';
+  const bool is_open = is_open_there(input);
+  if (!is_open && !input.winner) {
+    out << "  ! no component there has the port open: nothing is taken\n";
   }
+  write_others_with_port(out, input.name, is_open, others_with_port(input.name, there.hosts, host));
 }
 
 void write_text(std::ostream& out, const Elsewhere& there, const wire::InputStatus& input,
@@ -219,6 +205,7 @@ json json_of(const Elsewhere& there, const wire::InputStatus& input, const std::
                    {"generation", there.model.generation()},
                    {"arbitrated", input.arbitrated},
                    {"open", is_open_there(input)},
+                   {"also_open_on", others_with_port(input.name, there.hosts, host)},
                    {"winner", text_or_null(input.winner.value_or(""))},
                    {"nothing_comes_of_it", text_or_null(why_nothing_comes(there.status, input))},
                    {"connections", json::array()},

@@ -19,6 +19,10 @@ namespace arbiter::cli {
 [[nodiscard]] std::optional<std::string> host_that_decides(const std::string& port,
                                                            const wire::HostsDocument& hosts);
 
+// Further hosts that have it open, a line each. `is_open`: the host that is spoken of has, too.
+void write_others_with_port(std::ostream& out, const std::string& port, bool is_open,
+                            const std::vector<std::string>& others);
+
 // Throws watch::WatchError where several machines have that name.
 void require_one_host(const std::string& name, const wire::HostsDocument& hosts);
 

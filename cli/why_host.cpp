@@ -1,6 +1,7 @@
 // Which host answers `arbiter why`.
 #include <algorithm>
 #include <optional>
+#include <ostream>
 #include <string>
 #include <vector>
 
@@ -26,6 +27,16 @@ std::optional<std::string> host_that_decides(const std::string& port,
                             ", and each decides it for itself: name one with --host");
   }
   return found.empty() ? std::nullopt : std::optional(found.front());
+}
+
+void write_others_with_port(std::ostream& out, const std::string& port, bool is_open,
+                            const std::vector<std::string>& others) {
+  for (const std::string& host : others) {
+    out << "  ! it is " << (is_open ? "also " : "") << "open on host " << host
+        << (is_open ? ", and each of them decides it by itself: open it on one only; "
+                    : ", which decides it for its component: ")
+        << "arbiter why " << port << " --host " << host << '\n';
+  }
 }
 
 void require_one_host(const std::string& name, const wire::HostsDocument& hosts) {

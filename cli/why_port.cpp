@@ -5,6 +5,7 @@
 
 #include "cli/model_report.hpp"
 #include "cli/why_answer.hpp"
+#include "cli/why_elsewhere.hpp"
 #include "cli/why_report.hpp"
 
 namespace arbiter::cli {
@@ -40,6 +41,7 @@ void WhyAnswer::write_port() const {
   }
   write_model();
   write_obstacles(out_, obstacles_.of_port());
+  write_others_with_port(out_, port_.name(), is_open_, also_open_on_);
   if (!look_.picture.is_settled) {
     out_
         << "  ! sources change faster than they can be read: this answer may mix several moments\n";

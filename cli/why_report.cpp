@@ -205,6 +205,24 @@ std::string first_cause(const rules::ConnectionExplanation& connection, const So
   return "nothing";
 }
 
+std::vector<std::string> causes_in_short(const rules::ConnectionExplanation& connection) {
+  std::vector<std::string> causes;
+  if (connection.wins) return causes;
+  if (!connection.has_rule) causes.emplace_back("no rule lets it win");
+  if (connection.earlier) causes.push_back("an earlier rule holds: that of " + *connection.earlier);
+  const auto& parts = connection.parts;
+  const bool may_hold = std::any_of(parts.begin(), parts.end(),
+                                    [](const rules::Part& part) { return part.causes.empty(); });
+  // What keeps one of its behaviours out is no cause where another would select it.
+  if (may_hold) return causes;
+  for (const rules::Part& part : parts) {
+    const bool is_alone = parts.size() == 1 || !part.behaviour;
+    const std::string whose = is_alone ? "" : "as " + describe(*part.behaviour) + " has it: ";
+    for (const rules::Cause& cause : part.causes) causes.push_back(whose + headline(cause));
+  }
+  return causes;
+}
+
 std::string loss_text(const rules::ConnectionExplanation& loser, const Sources& sources) {
   const std::string cause = first_cause(loser, sources);
   return cause.starts_with("inhibited") ? cause : "out: " + cause;

@@ -37,6 +37,9 @@ std::string headline(const rules::Cause& cause);
 // of the first.
 std::string first_cause(const rules::ConnectionExplanation& connection, const Sources& sources);
 
+// All of what keeps it out, without activities; nothing where it wins, or would if it were active.
+std::vector<std::string> causes_in_short(const rules::ConnectionExplanation& connection);
+
 // "inhibited by …", "out: …": why one that had won does not any more, though it is active.
 std::string loss_text(const rules::ConnectionExplanation& loser, const Sources& sources);
 

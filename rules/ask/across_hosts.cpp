@@ -7,6 +7,7 @@
 #include "rules/ask/instants.hpp"
 #include "rules/ask/negation_places.hpp"
 #include "rules/model/polarity.hpp"
+#include "rules/model/provenance.hpp"
 #include "rules/text/duration.hpp"
 #include "rules/text/names.hpp"
 
@@ -130,8 +131,11 @@ class AcrossHosts {
 
   void refuse_forever(const std::string& source, const SourceUse& use, const RemoteUse& remote) {
     if (remote.required_at.empty()) return;
+    // That is to be changed, not the connection.
+    Location where;
+    if (rules_.provenance) where = place_of_timeout(rules_.provenance->model, source);
     diagnostics_.error(
-        "remote-forever", use.where,
+        "remote-forever", where.file.empty() ? use.where : where,
         source + " is on " + enumerate(places_.of_source(source)) +
             ", its T is forever, and a rule at " + at_hosts(remote.required_at, places_) +
             " requires it to be active: a cut network would not end its activity there; give it a "

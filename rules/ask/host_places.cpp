@@ -22,6 +22,14 @@ std::string in_words(const std::vector<std::string>& hosts,
   return enumerate(hosts) + ", by the modules " + enumerate(named);
 }
 
+// The first that is elsewhere than those before it: with that one it went wrong.
+const Location& place_of_second(const std::vector<const Module*>& modules) {
+  const auto elsewhere = std::find_if(modules.begin(), modules.end(), [&](const Module* each) {
+    return !each->node.empty() && each->node != modules.front()->node;
+  });
+  return (elsewhere == modules.end() ? modules.front() : *elsewhere)->where;
+}
+
 class Placement {
  public:
   Placement(const Application& application, Diagnostics& diagnostics)
@@ -160,9 +168,10 @@ HostPlaces::HostPlaces(const RuleSet& rules, const SourceUses& uses, const Appli
     of_ports_.emplace(port, hosts.size() == 1 ? hosts.front() : "");
     if (hosts.size() == 1) ++counts_[hosts.front()].ports;
     if (hosts.size() < 2) return;
-    diagnostics.error("port-on-two-hosts", where,
-                      "the input port " + port + " is on " + std::to_string(hosts.size()) +
-                          " hosts, " + in_words(hosts, placement.modules_of(port)) +
+    const auto& modules = placement.modules_of(port);
+    diagnostics.error("port-on-two-hosts", place_of_second(modules),
+                      "the input port " + port + " (" + describe(where) + ") is on " +
+                          std::to_string(hosts.size()) + " hosts, " + in_words(hosts, modules) +
                           ": each host would decide it by itself; open it on one host only, or "
                           "rename one of them with --name",
                       about);
@@ -174,9 +183,10 @@ HostPlaces::HostPlaces(const RuleSet& rules, const SourceUses& uses, const Appli
     auto hosts = placement.find(source, use.where, use.in_model, about);
     if (hosts.size() == 1) ++counts_[hosts.front()].sources;
     if (hosts.size() > 1) {
-      diagnostics.warning("source-on-two-hosts", use.where,
-                          source + " is on " + std::to_string(hosts.size()) + " hosts, " +
-                              in_words(hosts, placement.modules_of(source)) +
+      const auto& modules = placement.modules_of(source);
+      diagnostics.warning("source-on-two-hosts", place_of_second(modules),
+                          source + " (" + describe(use.where) + ") is on " +
+                              std::to_string(hosts.size()) + " hosts, " + in_words(hosts, modules) +
                               ": each of them obeys its own, and any other host the one that it "
                               "has, until that one is gone; rename one of them with --name",
                           about);

@@ -21,6 +21,8 @@ using Json = nlohmann::ordered_json;
 
 // Of one code. What is true of each of a thousand ports is read of a few.
 constexpr std::size_t kMaxNotesShown = 10;
+// Of more than these that say the same of other names, one is shown, and the places of the others.
+constexpr std::size_t kMaxAlikeShown = 4;
 
 const char* name_of(Severity severity) {
   switch (severity) {
@@ -134,6 +136,57 @@ std::string in_words(const Omission& omission) {
          (omission.count == 1 ? "] was found and is" : "] were found and are") + " not listed";
 }
 
+// What is left of a message without names, lists of them, numbers, marks, and what stands in
+// parentheses.
+std::string frame_of(const std::string& message) {
+  std::string frame, word;
+  std::size_t depth = 0;
+  bool is_quoted = false;
+  for (const char c : message + ' ') {
+    if (c == '"') is_quoted = !is_quoted;
+    depth += c == '(' ? 1 : 0;
+    if (c == ' ' && !is_quoted) {
+      const bool is_listed = word == "and" || word == "or" || word == "more" || word == "is" ||
+                             word == "are" || word.find_first_of("/\"0123456789") == 0;
+      if (!is_listed && !word.empty()) frame += word + ' ';
+      word.clear();
+    } else if (depth == 0 && c != ',' && c != ';') {
+      word += c;
+    }
+    if (c == ')' && depth > 0) --depth;
+  }
+  return frame;
+}
+
+using Alike = std::vector<const Diagnostic*>;
+
+std::string group_of(const Diagnostic& item) { return item.code + '\n' + frame_of(item.message); }
+
+// Notes of one code that differ in names only.
+std::map<std::string, Alike> groups_of_notes(const std::vector<const Diagnostic*>& items) {
+  std::map<std::string, Alike> groups;
+  for (const Diagnostic* item : items) {
+    if (item->severity != Severity::kNote) continue;
+    groups[group_of(*item)].push_back(item);
+  }
+  return groups;
+}
+
+// "12 more like it: line 7 (/Arm/pos:i), b.xml:3:5 (/Head/gaze:i), …".
+void write_others(std::ostream& out, const Alike& alike) {
+  out << "  and " << alike.size() - 1 << " more like it: ";
+  const std::size_t listed = std::min(alike.size(), kMaxNotesShown);
+  for (std::size_t i = 1; i < listed; ++i) {
+    const Location& where = alike[i]->where;
+    const Subject& about = alike[i]->about;
+    out << (i == 1 ? "" : ", ")
+        << (where.file == alike[0]->where.file ? "line " + std::to_string(where.line)
+                                               : printable_place(where));
+    if (about.ports.size() == 1) out << " (" << about.ports.front() << ')';
+  }
+  out << (listed < alike.size() ? ", …" : "") << "; arbiter check --json has each\n";
+}
+
 }  // namespace
 
 std::string counts(const Diagnostics& diagnostics) {
@@ -150,20 +203,37 @@ std::string counts(const Diagnostics& diagnostics) {
 void write_text(std::ostream& out, const Diagnostics& diagnostics) {
   if (diagnostics.items().empty()) return;
   Excerpts excerpts;
-  std::map<std::string, std::size_t> notes;  // by code
-  for (const Diagnostic* item : in_reading_order(diagnostics)) {
-    if (item->severity == Severity::kNote && ++notes[item->code] > kMaxNotesShown) continue;
+  const auto items = in_reading_order(diagnostics);
+  const auto groups = groups_of_notes(items);
+  struct Told {
+    std::size_t kept = 0, whole = 0, listed = 0;
+  };
+  std::map<std::string, Told> notes;  // by code
+  for (const Diagnostic* item : items) {
+    if (item->severity != Severity::kNote) {
+      write_item(out, *item, excerpts);
+      continue;
+    }
+    Told& told = notes[item->code];
+    ++told.kept;
+    const Alike& alike = groups.at(group_of(*item));
+    const bool is_group = alike.size() > kMaxAlikeShown;
+    if ((is_group && item != alike.front()) || told.whole == kMaxNotesShown) continue;
+    ++told.whole;
     write_item(out, *item, excerpts);
+    if (!is_group) continue;
+    write_others(out, alike);
+    told.listed += alike.size() - 1;
   }
   for (const Omission& omission : diagnostics.omissions()) {
     if (omission.severity != Severity::kNote) out << in_words(omission) << '\n';
   }
-  for (const auto& [code, kept] : notes) {
+  for (const auto& [code, told] : notes) {
     const std::size_t found = diagnostics.count(Severity::kNote, code);
-    if (found <= kMaxNotesShown) continue;
-    out << found - kMaxNotesShown << " more notes [" << code
-        << "] are not shown; arbiter check --json has "
-        << (found == kept ? "them" : "the first " + std::to_string(kept)) << '\n';
+    const std::size_t left = found - told.whole - told.listed;
+    if (left == 0) continue;
+    out << left << " more notes [" << code << "] are not shown; arbiter check --json has "
+        << (found == told.kept ? "them" : "the first " + std::to_string(told.kept)) << '\n';
   }
   out << counts(diagnostics) << '\n';
 }

@@ -369,12 +369,8 @@ std::vector<std::string> Explainer::ports() const {
 }
 
 Location Explainer::place_of_timeout(const std::string& source) const {
-  if (rules_.provenance == nullptr) return {};
-  const Model& model = rules_.provenance->model;
-  for (const SourceDeclaration& each : model.sources) {
-    if (each.name == source && each.timeout) return each.where;
-  }
-  return model.timeout ? model.timeout->where : Location();
+  return rules_.provenance == nullptr ? Location()
+                                      : rules::place_of_timeout(rules_.provenance->model, source);
 }
 
 std::string describe(const Element& element) {

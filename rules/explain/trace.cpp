@@ -83,7 +83,9 @@ std::optional<TraceEvent> TraceParser::read_event(const CsvRecord& record) {
   if (record.size() != columns_) {
     error("trace-fields", record[std::min(record.size() - 1, columns_)],
           "this line has " + counted(record.size(), "field") + ", and the header " +
-              std::to_string(columns_));
+              std::to_string(columns_) +
+              (record.size() == 3 ? "; write t_ns,source,event as the header"
+                                  : "; write as many in each line"));
     return std::nullopt;
   }
   const auto time = read_time(record[kTimeAt]);
@@ -100,7 +102,8 @@ std::optional<shm::Nanoseconds> TraceParser::read_time(const CsvField& field) {
                                                       [](char c) { return c >= '0' && c <= '9'; });
   if (!is_number) {
     error("trace-time", field,
-          "the time " + quote(text) + " is not a whole number of nanoseconds from 0 up");
+          "the time " + quote(text) +
+              " is not a whole number of nanoseconds from 0 up; half a second is 500000000");
     return std::nullopt;
   }
   shm::Nanoseconds time = 0;

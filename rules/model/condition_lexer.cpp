@@ -102,7 +102,9 @@ constexpr auto kForeignWords = std::to_array<Foreign>({
     {"then", "write implies or ->, as in /Object/pos:o -> /Face/pos:o"},
     {"nor", "write and not"},
     {"nand", "write not (… and …)"},
-    {"unless", "write or"},
+    {"unless", "write and not"},
+    {"never", "write not"},
+    {"always", "a rule holds whenever it is true: write the condition alone"},
     {"equals", "write iff or <->"},
     {"but", "write and"},
 });
@@ -154,7 +156,8 @@ std::string advice_on(char character) {
     case '$':
       return "a define is used as ${name}";
     case ',':
-      return "write and, or or, between two conditions";
+      return "write and, or or, between two conditions, and a quantifier for each pattern: "
+             "any(/Nav/*) or any(/Op/*)";
     default:
       return "remove it, or put the name that it belongs to in double quotes";
   }

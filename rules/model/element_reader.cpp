@@ -35,15 +35,17 @@ std::string propose(std::string_view name, KnownNames known, std::string_view be
 
 }  // namespace
 
-bool ElementReader::check_attributes(const XmlNode& element, KnownNames known) {
+bool ElementReader::check_attributes(const XmlNode& element, KnownNames known, Advice advice) {
   bool fine = true;
   for (std::size_t i = 0; i < element.attributes.size(); ++i) {
     const XmlAttribute& attribute = element.attributes[i];
     const Location where = file_.locate(file_.offset_of(attribute.name.data()));
     if (std::find(known.begin(), known.end(), attribute.name) == known.end()) {
       error("unknown-attribute", where, [&] {
+        const std::string_view better = advice == nullptr ? "" : advice(attribute.name);
         return in_brackets(element) + " has no attribute " + quote(attribute.name) +
-               propose(attribute.name, known, "", "");
+               (better.empty() ? propose(attribute.name, known, "", "")
+                               : "; " + std::string(better));
       });
       fine = false;
       continue;

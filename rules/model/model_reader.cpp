@@ -158,6 +158,10 @@ class ModelReader {
       reader_.error("unknown-element", reader_.where(element),
                     "<" + std::string(element.text) +
                         "> is a root; put it around everything, or leave it away");
+    } else if (element.text == "include" || element.text.ends_with(":include")) {
+      reader_.error("unknown-element", reader_.where(element),
+                    "no file includes another; give all files of a model together, as in "
+                    "`arbiter check robot.xml arm.xml` and `arbiterd --model robot.xml arm.xml`");
     } else if (is_in_root_) {
       reader_.report_unknown_element(element,
                                      {"define", "source", "behavior", "meta_behavior", "arbiter"});

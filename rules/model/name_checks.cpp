@@ -202,6 +202,14 @@ class WrongEnds {
   Diagnostics& diagnostics_;
 };
 
+void warn_of_pattern(const std::string& name, const NameUse& use, Diagnostics& diagnostics) {
+  if (name.find('*') == std::string::npos) return;
+  diagnostics.warning("pattern-as-name", use.where,
+                      name + " is the name of one port here" + origin_of(use) +
+                          ": only any(…), all(…) and none(…) in conditions take patterns; write "
+                          "each name that you meant");
+}
+
 }  // namespace
 
 void check_names(const Model& model, const std::optional<Application>& application,
@@ -215,6 +223,8 @@ void check_names(const Model& model, const std::optional<Application>& applicati
       ports.add({link.port, link.where}, kConnected);
     }
   }
+  for (const auto& [name, use] : model.source_uses) warn_of_pattern(name, use, diagnostics);
+  for (const auto& [name, use] : model.port_uses) warn_of_pattern(name, use, diagnostics);
   NameCheck source_check(model.source_uses, sources, "source port", order, diagnostics);
   if (rules != nullptr) warn_of_unread(model, *rules, source_check, sources, diagnostics);
   source_check.warn();

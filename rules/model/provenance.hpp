@@ -7,6 +7,7 @@
 #pragma once
 
 #include <cstddef>
+#include <string>
 
 #include "rules/model/hierarchy.hpp"
 #include "rules/model/model.hpp"
@@ -17,5 +18,13 @@ struct Provenance {
   Model model;
   Hierarchy::Relations relations;  // between Model::behaviours, by index
 };
+
+// Where T of a source is written; without a file where it is the default.
+inline Location place_of_timeout(const Model& model, const std::string& source) {
+  for (const SourceDeclaration& each : model.sources) {
+    if (each.name == source && each.timeout) return each.where;
+  }
+  return model.timeout ? model.timeout->where : Location();
+}
 
 }  // namespace arbiter::rules

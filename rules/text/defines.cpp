@@ -81,7 +81,9 @@ const std::string* Defines::look_up(const std::string& name, const Text& text, s
   }
   diagnostics.error("unknown-define", text.where(at),
                     "no define has the name " + quote(name) +
-                        advise(name, known, "write <define name=\"…\"> for it further up"));
+                        advise(name, known,
+                               "write <define name=\"…\"> for it further up, or give the file "
+                               "that has it before this one"));
   return nullptr;
 }
 

@@ -73,7 +73,9 @@ ParsedDuration parse_duration(std::string_view text, const DurationWords& words)
   if (lacks_zero) return parse_duration("0" + std::string(text), words);
   const std::size_t digits = text.find_first_not_of("0123456789");
   if (text.empty() || digits == 0) {
-    const bool means_forever = words.takes_forever && find_similar(text, {kForever});
+    const bool is_endless = text.starts_with("inf") || text == "never" || text == "always";
+    const bool means_forever =
+        words.takes_forever && (is_endless || find_similar(text, {kForever}));
     return refuse("is not a whole number with a unit",
                   means_forever ? "did you mean \"forever\"?" : words.advice);
   }

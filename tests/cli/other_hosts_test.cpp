@@ -82,5 +82,18 @@ TEST_F(ImportsThatLag, SayWhetherTheHostIsHeard) {
   EXPECT_THAT(text(), testing::HasSubstr("came from host head, which is gone (arbiter hosts)\n"));
 }
 
+TEST(APortOnSeveralHosts, IsToldWithEachOtherHostThatIsThere) {
+  wire::HostsDocument hosts;
+  hosts.host = "base";
+  for (const char* name : {"base", "head", "rear", "tail"}) {
+    wire::HostStatus& host = hosts.hosts.emplace_back();
+    host.host = name;
+    host.is_up = host.host != "rear";
+    if (host.host != "tail") host.inputs = {"/Arm/pos:i"};
+  }
+  EXPECT_THAT(others_with_port("/Arm/pos:i", hosts, hosts.host), testing::ElementsAre("head"));
+  EXPECT_THAT(others_with_port("/Leg/pos:i", hosts, hosts.host), testing::IsEmpty());
+}
+
 }  // namespace
 }  // namespace arbiter::cli

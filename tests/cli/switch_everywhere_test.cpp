@@ -280,6 +280,26 @@ TEST(SwitchEverywhere, OfTwoMachinesWithOneNameOnlyTheOneThatPreparedIsLookedAt)
   EXPECT_THAT(outcomes(hosts.run()), ElementsAre("a switched"));
 }
 
+TEST(SwitchEverywhere, AHostThatHadTheModelHasNotSwitched) {
+  FakeHosts hosts;
+  hosts.answers = {{"prepare", {yes("arm", 5), yes("base", 5)}},
+                   {"commit", {yes("arm", 5), yes("base", 6)}}};
+  const auto written = [&] {
+    const auto result = hosts.run();
+    EXPECT_EQ(exit_code_of(result), 0);
+    testing::internal::CaptureStdout();
+    write_text(result, "dance");
+    return testing::internal::GetCapturedStdout();
+  };
+  const std::string text = written();
+  EXPECT_THAT(text, testing::StartsWith("arm   has it already: model 5\nbase  switched after "));
+  EXPECT_THAT(text, HasSubstr("\n1 host switched to \"dance\" one by one"));
+  hosts.answers["commit"] = {yes("arm", 5), yes("base", 5)};
+  EXPECT_EQ(written(),
+            "arm   has it already: model 5\nbase  has it already: model 5\n"
+            "\"dance\" was in force already, so nothing has changed\n");
+}
+
 TEST(SwitchEverywhere, WhereAllHaveAnsweredNobodyIsLookedAt) {
   FakeHosts hosts;
   hosts.answers = {{"prepare", {yes("a")}}, {"commit", {yes("a", 6)}}};

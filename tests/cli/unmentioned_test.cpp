@@ -66,10 +66,14 @@ TEST(Unmentioned, AChangeNamesInputPortsThatGetNothingFromNowOn) {
   Node node("test");
   auto in = node.input_port("/Gaze/pos:i");
   auto out = node.output_port("/other:o");
+  EXPECT_THAT(arbiter({"reload", "--dry-run"}).out, Not(HasSubstr("open")));
   EXPECT_THAT(arbiter({"reload"}).out, Not(HasSubstr("open")));
   daemon.write_model(
       "<behaviors><behavior name='A'><config at='/Arm/pos:i'>/a:o</config>"
       "</behavior></behaviors>");
+  EXPECT_THAT(arbiter({"reload", "--dry-run"}).out,
+              HasSubstr("\n  open now, and not mentioned by these files, so that no sample would "
+                        "arrive: /Gaze/pos:i\nthis was a dry run"));
   EXPECT_THAT(arbiter({"reload"}).out,
               HasSubstr("\n  open, but not mentioned by this model, so that no sample arrives: "
                         "/Gaze/pos:i\n"));

@@ -56,6 +56,18 @@ TEST(WhyNames, TellsOfASourceThatIsOnlySensedWhatItWouldOfAConnection) {
             Not(HasSubstr("  ! /"))));
 }
 
+TEST(WhyNames, OfASourceTellsAtWhichPortsItMatters) {
+  Daemon daemon(R"(<behaviors><source port="/stop:o"/>
+<behavior name="Wander"><config at="/base">/wander</config><config at="/arm">/wander</config>
+  <condition>not /stop:o</condition></behavior></behaviors>)");
+  EXPECT_THAT(arbiter({"why", "/wander"}).err,
+              HasSubstr("/wander is an output port, connected to /arm and /base; give the input "
+                        "port first: arbiter why /arm /wander"));
+  EXPECT_THAT(arbiter({"why", "/stop:o"}).err,
+              HasSubstr("/stop:o is an output port, read at /arm and /base; give the input port "
+                        "first: arbiter why /arm /stop:o"));
+}
+
 TEST(WhyNames, TellsOfPortsUnderANearName) {
   Daemon daemon(kMisnamed);
   Node node("test");

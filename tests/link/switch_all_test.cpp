@@ -122,6 +122,12 @@ TEST_F(SwitchAll, AllHostsSwitch) {
   EXPECT_THAT(result.out, AllOf(HasSubstr("arm   switched after "), HasSubstr(": model 2\n"),
                                 HasSubstr("3 hosts switched to \"rest\" one by one, within ")));
   EXPECT_THAT(in_force(), Each("rest"));
+  const auto again = switch_all({"rest", "--instance", "base"});
+  EXPECT_EQ(again.exit_code, 0) << again.out << again.err;
+  EXPECT_EQ(again.out,
+            "arm   has it already: model 2\nbase  has it already: model 2\n"
+            "cam   has it already: model 2\n\"rest\" was in force already, so nothing has "
+            "changed\n");
 }
 
 TEST_F(SwitchAll, IfOneCannotNoneDoes) {

@@ -89,6 +89,50 @@ TEST_F(WhyOfHosts, WhyOfOneThatDoesNotHaveThePortOpenSaysSo) {
   EXPECT_EQ(of_base["nothing_comes_of_it"], nullptr);
 }
 
+// What keeps one of its behaviours out does not keep the connection out.
+TEST_F(WhyOfHosts, AConnectionThatAnotherBehaviourWouldSelectIsNotSaidToBeKeptOut) {
+  const std::string go = std::string("<config at='") + kMotor + "'>" + kPlanner + "</config>";
+  const std::string model = "<behaviors><behavior name='A'>" + go +
+                            "<condition>/go:o</condition></behavior><behavior name='B'>" + go;
+  Host head("head", runtime_, model + "<condition>not /stop:o</condition></behavior></behaviors>",
+            network());
+  Host base("base", runtime_, model + "<condition>/stop:o</condition></behavior></behaviors>",
+            network());
+  for (const char* const host : {"base", "head"}) {
+    await_hosts(host, [](const wire::HostsDocument& hosts) { return hosts.hosts.size() == 2; });
+  }
+  const auto causes = [](const char* from, const char* of) {
+    return json::parse(run_arbiter(from, {"why", kMotor, "--host", of, "--json"}).out)
+        .at("connections")
+        .at(0)
+        .at("causes");
+  };
+  EXPECT_EQ(causes("base", "head"), json::array());
+  const json kept_out = causes("head", "base");
+  ASSERT_EQ(kept_out.size(), 2u);
+  EXPECT_THAT(kept_out[0].get<std::string>(),
+              testing::StartsWith("as behaviour \"A\" has it: kept out by the condition of "));
+}
+
+TEST_F(WhyOfHosts, OfAPortThatTwoHostsHaveOpenTheOtherIsNamed) {
+  Host head("head", runtime_, motor_model("1000s"), network());
+  Host base("base", runtime_, motor_model("1000s"), network());
+  Body of_head(head);
+  Body of_base(base);
+  await_hosts("base", [](const wire::HostsDocument& hosts) {
+    const auto* const there = hosts.find_host("head");
+    return there != nullptr && there->inputs.size() == 1;
+  });
+  const char* const kOther =
+      "\n  ! it is also open on host head, and each of them decides it by itself: open it on one "
+      "only; arbiter why /Motor/speed:i --host head\n";
+  EXPECT_THAT(run_arbiter("base", {"why", kMotor}).out, HasSubstr(kOther));
+  const json answer = json::parse(run_arbiter("base", {"why", kMotor, "--json"}).out);
+  EXPECT_EQ(answer["also_open_on"], json::array({"head"}));
+  EXPECT_THAT(run_arbiter("base", {"why", kMotor, "--host", "head"}).out,
+              HasSubstr("\n  ! it is also open on host base, "));
+}
+
 // The same is said as without --follow, and in JSON each line is as of a port of this host.
 TEST_F(WhyOfHosts, WhoFollowsOneThatDoesNotHaveThePortOpenIsToldSo) {
   Host head("head", runtime_, motor_model("1000s"), network());

@@ -163,6 +163,12 @@ TEST(AcrossHosts, OnTwoHostsAnInputPortIsAnErrorAndASourceAWarning) {
   EXPECT_THAT(checked.findings(),
               ElementsAre("error port-on-two-hosts /Arm:i", "warning source-on-two-hosts /Rest:o"));
   EXPECT_THAT(checked.items[0].message, HasSubstr("base and spare, by the modules \"Arm\" (app."));
+  // There it is to be changed; where the model has it, the message says.
+  const std::string before = "<application>" + module("Arm", "base");
+  EXPECT_EQ(describe(checked.items[0].where), "app.xml:1:" + std::to_string(before.size() + 1));
+  EXPECT_THAT(checked.items[0].message, HasSubstr("a.xml:2:25) is on 2 hosts, base"));
+  EXPECT_EQ(checked.items[1].where.file, "app.xml");
+  EXPECT_THAT(checked.items[1].message, HasSubstr("a.xml:2:25) is on 2 hosts, base"));
 }
 
 // Each of two hosts that have a source obeys its own: for them nothing crosses.
@@ -248,11 +254,17 @@ TEST(AcrossHosts, ForeverIsRefusedWhereARemoteSourceMustBeActive) {
   const std::string base = module("Base", "a") + module("Nav", "a");
   EXPECT_THAT(check(model, base + module("Free", "b")).findings(),
               Contains("error remote-forever /Free:o"));
+  EXPECT_EQ(check(model, base + module("Free", "b")).find("remote-forever")->where.column, 12u)
+      << "the <source>, not the <config>";
   EXPECT_THAT(check(model, base + module("Free", "a")).findings(), IsEmpty());
   const std::string commands = R"(<behaviors timeout="forever"><behavior name="Drive">
     <config at="/Base:i">/Nav:o</config></behavior></behaviors>)";
   EXPECT_THAT(check(commands, module("Base", "a") + module("Nav", "b")).findings(),
               Contains("error remote-forever /Nav:o"));
+  EXPECT_EQ(check(commands, module("Base", "a") + module("Nav", "b"))
+                .find("remote-forever")
+                ->where.column,
+            21u);
   const std::string inhibits = R"(<behaviors><source port="/Lock:o" timeout="forever"/>
     <behavior name="Drive"><config at="/Base:i">/Nav:o</config>
       <condition>not /Lock:o</condition></behavior></behaviors>)";

@@ -43,7 +43,8 @@ TEST(Duration, HasMinutesOnACommandLineOnly) {
 }
 
 TEST(Duration, ForeverIsRecognisedWhereItIsMisspelt) {
-  for (const char* const text : {"Forever", "FOREVER", "for ever", "foreve"}) {
+  for (const char* const text :
+       {"Forever", "FOREVER", "for ever", "foreve", "inf", "infinity", "never"}) {
     EXPECT_THAT(parse_duration(text).problem, HasSubstr("; did you mean \"forever\"?")) << text;
   }
   EXPECT_THAT(parse_duration("soon").problem, testing::Not(HasSubstr("did you mean")));

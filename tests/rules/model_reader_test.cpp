@@ -167,6 +167,9 @@ TEST(ModelReader, UnknownElementsAndTextAreErrors) {
        "1:25 error unknown-element", "a meta-behaviour has no <config>"},
       {"<meta_behavior name='M'><arbiter/></meta_behavior>", "1:25 error unknown-element",
        "it takes <behavior>, <condition> or <inhibition>"},
+      {"<behaviors><include file='arm.xml'/></behaviors>", "1:12 error unknown-element",
+       "no file includes another; give all files of a model together, as in `arbiter check "},
+      {"<xi:include href='arm.xml'/>", "1:1 error unknown-element", "no file includes another"},
       {"<source port='/a'><b/></source>", "1:19 error unknown-element", "not known here; remove"},
       {"<arbiter at='/p'><config at='/p'>/s</config></arbiter>", "1:18 error unknown-element",
        "it takes <select>"},
@@ -184,6 +187,10 @@ TEST(ModelReader, UnknownElementsAndTextAreErrors) {
 
 TEST(ModelReader, UnknownMissingAndRepeatedAttributesAreErrors) {
   expect_findings({
+      {"<behavior name='B' timeout='1s'><config at='/p'>/s</config></behavior>",
+       "1:20 error unknown-attribute", "write <source port=\"…\" timeout=\"…\"/> beside"},
+      {"<behavior name='B'><config at='/p' priority='3'>/s</config></behavior>",
+       "1:36 error unknown-attribute", "name those that it keeps out in an <inhibition>, or"},
       {"<behaviors time='1s'/>", "1:12 error unknown-attribute", "has no attribute \"time\""},
       {"<behaviors timout='1s'/>", "1:12 error unknown-attribute", "did you mean timeout?"},
       {"<source port='/a' tiemout='1s'/>", "1:19 error unknown-attribute", "mean timeout?"},

@@ -249,6 +249,18 @@ TEST(NameChecks, OfSeveralTheOneThatIsDeclaredIsMeant) {
   EXPECT_THAT(loaded.message(2), HasSubstr("did you mean /estop:o, as at "));
 }
 
+TEST(NameChecks, APatternWhereANameBelongsIsTold) {
+  const Loaded read = load_condition("not \"/Op/*\" and none(/Op/*)");
+  EXPECT_THAT(read.findings(), ElementsAre("2:16 warning pattern-as-name"));
+  EXPECT_THAT(read.message(),
+              HasSubstr("/Op/* is the name of one port here: only any(…), all(…) "));
+  EXPECT_THAT(load_text("<behaviors><behavior name='B'><config at='/Arm/*'>/Nav/*:o</config>"
+                        "</behavior></behaviors>")
+                  .findings(),
+              testing::UnorderedElementsAre("1:43 warning pattern-as-name",
+                                            "1:51 warning pattern-as-name"));
+}
+
 TEST(NameChecks, ASourceThatIsAnInputPortIsToldAndTheOtherWayRound) {
   const Loaded read = load_condition("not /Base/vel:i");
   EXPECT_THAT(read.findings(), ElementsAre("2:16 warning wrong-end"));

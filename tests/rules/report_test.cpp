@@ -79,9 +79,16 @@ TEST(Report, DoesNotRepeatAWitnessThatTheMessageHasInWords) {
             "2 notes\n");
 }
 
+// No two of them are alike.
+std::string sentence(std::uint32_t i) {
+  std::string word;
+  for (; i > 0; i /= 26) word += static_cast<char>('a' + i % 26);
+  return "a note x" + word;
+}
+
 TEST(Report, ShowsTheFirstNotesOfACodeAndCountsTheRest) {
   Diagnostics diagnostics;
-  for (std::uint32_t i = 0; i < 25; ++i) diagnostics.note("n", {"m.xml", i + 1, 1}, "a note");
+  for (std::uint32_t i = 0; i < 25; ++i) diagnostics.note("n", {"m.xml", i + 1, 1}, sentence(i));
   for (std::uint32_t i = 0; i < 12; ++i) diagnostics.warning("w", {"m.xml", i + 1, 1}, "careful");
   const std::string text = printed(diagnostics);
   EXPECT_NE(text.find("m.xml:10:1: note"), std::string::npos);
@@ -91,6 +98,41 @@ TEST(Report, ShowsTheFirstNotesOfACodeAndCountsTheRest) {
       text.ends_with("\n15 more notes [n] are not shown; arbiter check --json has them\n"
                      "12 warnings, 25 notes\n"));
   EXPECT_EQ(json_of(diagnostics).size(), 37u);
+}
+
+TEST(Report, ShowsOneOfManyNotesThatDifferInNamesOnlyAndThePlacesOfTheOthers) {
+  Diagnostics diagnostics;
+  const auto add = [&](const char* file, std::uint32_t line, const std::string& port,
+                       const std::string& sources) {
+    diagnostics.note("n", {file, line, 1},
+                     "with " + sources + " active, nobody wins at " + port + " (one of " +
+                         std::to_string(line) + " causes); connect \"Rest " + port + "\" there",
+                     {.ports = {port}});
+  };
+  add("m.xml", 1, "/a:i", "/x");
+  add("m.xml", 2, "/b:i", "/x and /y");
+  add("m.xml", 3, "/c:i", "/x, /y, /z and 4 more");
+  add("m.xml", 4, "/d:i", "/y");
+  diagnostics.note("other", {"m.xml", 5, 1}, "with /x active, nobody wins at /a:i; connect it");
+  EXPECT_EQ(json_of(diagnostics).size(), 5u);
+  EXPECT_THAT(printed(diagnostics), testing::HasSubstr("m.xml:4:1: note: with /y active"));
+  // It is the only such cause.
+  diagnostics.note("n", {"k.xml", 6, 1},
+                   "with /x active, nobody wins at /e:i; connect \"Rest\" there",
+                   {.ports = {"/e:i"}});
+  EXPECT_EQ(printed(diagnostics),
+            "m.xml:1:1: note: with /x active, nobody wins at /a:i (one of 1 causes); connect "
+            "\"Rest /a:i\" there [n]\n"
+            "  and 4 more like it: line 2 (/b:i), line 3 (/c:i), line 4 (/d:i), k.xml:6:1 (/e:i); "
+            "arbiter check --json has each\n"
+            "m.xml:5:1: note: with /x active, nobody wins at /a:i; connect it [other]\n"
+            "6 notes\n");
+  for (std::uint32_t line = 7; line < 17; ++line) add("m.xml", line, "/f:i", "/x");
+  EXPECT_THAT(printed(diagnostics),
+              testing::HasSubstr("  and 14 more like it: line 2 (/b:i), line 3 (/c:i), line 4 "
+                                 "(/d:i), line 7 (/f:i), line 8 (/f:i), line 9 (/f:i), line 10 "
+                                 "(/f:i), line 11 (/f:i), line 12 (/f:i), …; arbiter check"));
+  EXPECT_EQ(json_of(diagnostics).size(), 16u);
 }
 
 TEST(Report, PutsErrorsBeforeWarningsBeforeNotes) {
@@ -107,7 +149,7 @@ TEST(Report, SaysHowManyMoreThereAreBeyondTheBoundOfACode) {
   constexpr std::uint32_t kBound = Diagnostics::kMaxOfCode;
   Diagnostics diagnostics;
   for (std::uint32_t i = 0; i < kBound + 3; ++i) {
-    diagnostics.note("n", {"m.xml", i + 1, 1}, "a note");
+    diagnostics.note("n", {"m.xml", i + 1, 1}, sentence(i));
     diagnostics.error("e", {"m.xml", i + 1, 1}, "wrong");
   }
   diagnostics.error("other", {"m.xml", 1, 1}, "wrong, too");

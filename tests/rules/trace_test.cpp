@@ -120,7 +120,8 @@ TEST(Trace, EachLineHasTheFieldsOfTheHeader) {
   Diagnostics diagnostics;
   events_of("t_ns,source\n1\n", diagnostics);
   ASSERT_EQ(diagnostics.items().size(), 1u);
-  EXPECT_EQ(diagnostics.items()[0].message, "this line has 1 field, and the header 2");
+  EXPECT_EQ(diagnostics.items()[0].message,
+            "this line has 1 field, and the header 2; write as many in each line");
 }
 
 TEST(Trace, RefusesOtherEvents) {
