@@ -44,6 +44,8 @@
 
 namespace arbiter::detail {
 
+struct PortAtHand;
+
 class NodeCore : public std::enable_shared_from_this<NodeCore> {
  public:
   // Connects. Throws Error.
@@ -184,13 +186,9 @@ class NodeCore : public std::enable_shared_from_this<NodeCore> {
   void be_alone(Clock::duration look_again_in) noexcept;
   void ring_timer_every(Clock::duration time) const;
   void rejoin();
-  // Under mutex_, to the new socket: all that the node has, one thing, one port. False: it cannot.
-  [[nodiscard]] bool hand_back();
-  [[nodiscard]] bool hand_back(const wire::Message& message,
-                               Outbox::Descriptors descriptors = {-1, -1}) noexcept;
-  template <class Core>
-  [[nodiscard]] bool hand_back(wire::MessageKind kind, const Core& core, std::uint32_t id,
-                               std::uint32_t flags, const shm::FileDescriptor& second);
+  [[nodiscard]] bool hand_back_memory(const shm::FileDescriptor& socket, bool has_ports) const;
+  [[nodiscard]] bool hand_back(const shm::FileDescriptor& socket,
+                               const std::vector<PortAtHand>& ports) const;
   void be_welcomed(wire::Received& welcome);
   void be_turned_away(const wire::Message& refusal);
   // Whether the daemon is there, and has read all that we have said.

@@ -13,23 +13,22 @@ void make_non_blocking(const shm::FileDescriptor& socket) noexcept {
   fcntl(socket.get(), F_SETFL, O_NONBLOCK);
 }
 
-bool Outbox::send(int socket, const wire::Message& message, Descriptors descriptors,
-                  Bound bound) noexcept {
-  if (!waiting_.empty()) return keep(message, descriptors, bound);
+bool Outbox::send(int socket, const wire::Message& message, Descriptors descriptors) noexcept {
+  if (!waiting_.empty()) return keep(message, descriptors);
   switch (wire::send_message(socket, message, descriptors)) {
     case wire::SendResult::kSent:
     case wire::SendResult::kClosed:
       return true;
     case wire::SendResult::kFull:
-      return keep(message, descriptors, bound);
+      return keep(message, descriptors);
     case wire::SendResult::kTooMany:
       break;
   }
   return false;
 }
 
-bool Outbox::keep(const wire::Message& message, Descriptors descriptors, Bound bound) noexcept try {
-  if (bound == Bound::kMost && waiting_.size() >= kMostWaiting) return false;
+bool Outbox::keep(const wire::Message& message, Descriptors descriptors) noexcept try {
+  if (waiting_.size() == kMostWaiting) return false;
   Waiting waiting{message, {}};
   for (std::size_t i = 0; i < descriptors.size() && descriptors[i] >= 0; ++i) {
     waiting.descriptors[i] = shm::duplicate(descriptors[i]);

@@ -17,15 +17,13 @@ namespace arbiter::detail {
 class Outbox {
  public:
   using Descriptors = std::array<int, wire::kMaxDescriptors>;
-  // Of what may wait.
-  enum class Bound : std::uint8_t { kMost, kNone };
 
   // Sends it to a socket that does not block, or keeps it, with copies of the descriptors. False:
   // nothing can be said any more, and the conversation is to be begun anew: too much waits, or
   // there is no descriptor for a copy, or the user has too many under way. Where the daemon has
   // hung up what is said is lost with the conversation.
   [[nodiscard]] bool send(int socket, const wire::Message& message,
-                          Descriptors descriptors = {-1, -1}, Bound bound = Bound::kMost) noexcept;
+                          Descriptors descriptors = {-1, -1}) noexcept;
   // What there is room for by now. As send().
   [[nodiscard]] bool flush(int socket) noexcept;
 
@@ -45,8 +43,7 @@ class Outbox {
     std::array<shm::FileDescriptor, wire::kMaxDescriptors> descriptors;
   };
 
-  [[nodiscard]] bool keep(const wire::Message& message, Descriptors descriptors,
-                          Bound bound) noexcept;
+  [[nodiscard]] bool keep(const wire::Message& message, Descriptors descriptors) noexcept;
 
   std::deque<Waiting> waiting_;
 };

@@ -8,6 +8,7 @@
 
 #include <optional>
 #include <utility>
+#include <vector>
 
 #include "client/node/ended_nodes.hpp"
 #include "client/node/node_core.hpp"
@@ -17,6 +18,14 @@
 #include "wire/rendezvous.hpp"
 
 namespace arbiter::detail {
+
+// A port as it is handed back.
+struct PortAtHand {
+  wire::Message message;
+  shm::FileDescriptor first;
+  shm::FileDescriptor second;
+  std::vector<HeldLink> links;
+};
 
 namespace {
 
@@ -28,6 +37,40 @@ constexpr std::chrono::milliseconds kTurnedAwayInterval{1000};
 
 // One comes each second.
 constexpr int kToldRefusal = 3;
+
+bool is_sent(const shm::FileDescriptor& socket, const wire::Message& message,
+             std::array<int, wire::kMaxDescriptors> descriptors = {-1, -1}) {
+  return wire::send_message(socket.get(), message, descriptors) == wire::SendResult::kSent;
+}
+
+// With descriptors of our own, for the port may be closed while it is on its way.
+template <class Core>
+PortAtHand port_at_hand(wire::MessageKind kind, const Core& core, std::uint32_t id,
+                        const shm::FileDescriptor& second) {
+  PortAtHand port;
+  port.message.kind = kind;
+  port.message.port = core.instance();
+  port.message.id = id;
+  port.message.type = core.type();
+  port.message.set_name(core.name());
+  port.first = shm::duplicate(core.segment_descriptor().get());
+  port.second = shm::duplicate(second.get());
+  port.links = core.held_links();
+  return port;
+}
+
+bool is_handed_back(const shm::FileDescriptor& socket, const PortAtHand& port) {
+  if (!is_sent(socket, port.message, {port.first.get(), port.second.get()})) return false;
+  for (const HeldLink& link : port.links) {
+    wire::Message message;
+    message.kind = wire::MessageKind::kHandBackLink;
+    message.port = port.message.port;
+    message.peer = link.peer;
+    message.link = link.number;
+    if (!is_sent(socket, message)) return false;
+  }
+  return true;
+}
 
 }  // namespace
 
@@ -74,81 +117,76 @@ void NodeCore::rejoin() {
   } catch (const std::exception&) {  // no descriptors are left: another time
   }
   if (!found) return;
-  make_non_blocking(*found);
-  shm::close_in_children(*found);
-  const std::lock_guard lock(mutex_);
-  socket_ = std::make_shared<const shm::FileDescriptor>(std::move(*found));
+  const auto socket = std::make_shared<const shm::FileDescriptor>(std::move(*found));
+  std::vector<PortAtHand> ports;
+  {
+    const std::lock_guard lock(mutex_);
+    for (const auto& [instance, core] : outputs_) {
+      ports.push_back(port_at_hand(wire::MessageKind::kHandBackOutput, *core, core->source(),
+                                   core->page_descriptor()));
+      if (core->yields()) ports.back().message.flags = wire::kYields;
+    }
+    for (const auto& [instance, core] : inputs_) {
+      core->set_measured(false);  // unless the next daemon says so
+      ports.push_back(port_at_hand(wire::MessageKind::kHandBackInput, *core, core->port(),
+                                   core->bell().for_publishers()));
+    }
+  }
+  // What is handed back without its memory is lost: the daemon would give its name to another. So
+  // it is kept for us, as for one that is stopped, until we come another time.
+  const bool are_whole = std::all_of(
+      ports.begin(), ports.end(), [](const PortAtHand& port) { return port.first && port.second; });
+  if (!are_whole) {
+    static_cast<void>(hand_back_memory(*socket, true));
+    const std::lock_guard lock(mutex_);
+    turned_away_ = wire::no_descriptor_left("its ports");
+    ring_timer_every(kTurnedAwayInterval);
+    return;
+  }
   // Who has no ports left may be the last that has the memory, and with it what is active, and
   // which model is in force.
-  has_no_ports_ = outputs_.empty() && inputs_.empty();
+  has_no_ports_ = ports.empty();  // as asked_, of the thread that pumps alone
   asked_ = shm::monotonic_now();
-  // A port that is not handed back is kept for us, as for one that is stopped, until we come
-  // another time.
-  if (!watch_socket() || !hand_back()) {
-    turned_away_ = wire::no_descriptor_left("its ports");
+  if (!hand_back(*socket, ports)) return;
+  make_non_blocking(*socket);
+  shm::close_in_children(*socket);
+  const std::lock_guard lock(mutex_);
+  socket_ = socket;
+  if (!watch_socket()) {
     be_alone(kTurnedAwayInterval);
     return;
   }
-  heed_room(!outbox_.empty());
   standing_ = Standing::kRejoining;
   ring_timer_every({});
-}
-
-// However much it is, lest a component with many ports never comes back.
-bool NodeCore::hand_back(const wire::Message& message, Outbox::Descriptors descriptors) noexcept {
-  return outbox_.send(socket_->get(), message, descriptors, Outbox::Bound::kNone);
-}
-
-template <class Core>
-bool NodeCore::hand_back(wire::MessageKind kind, const Core& core, std::uint32_t id,
-                         std::uint32_t flags, const shm::FileDescriptor& second) {
-  wire::Message port;
-  port.kind = kind;
-  port.port = core.instance();
-  port.id = id;
-  port.flags = flags;
-  port.type = core.type();
-  port.set_name(core.name());
-  if (!hand_back(port, {core.segment_descriptor().get(), second.get()})) return false;
-  for (const HeldLink& held : core.held_links()) {
-    wire::Message link;
-    link.kind = wire::MessageKind::kHandBackLink;
-    link.port = core.instance();
-    link.peer = held.peer;
-    link.link = held.number;
-    if (!hand_back(link)) return false;
+  for (const PortAtHand& port : ports) {
+    const shm::PortInstance instance = port.message.port;  // closed meanwhile?
+    if (outputs_.count(instance) + inputs_.count(instance) == 0) say_closed(instance);
   }
-  return true;
 }
 
-bool NodeCore::hand_back() {
+bool NodeCore::hand_back_memory(const shm::FileDescriptor& socket, bool has_ports) const {
   wire::Message message = hello();
-  message.flags |= wire::kRejoins | (has_no_ports_ ? wire::kHasNoPorts : 0u);
-  if (!hand_back(message, {memory_->board().get(), memory_->registry().get()})) return false;
+  message.flags |= wire::kRejoins | (has_ports ? 0u : wire::kHasNoPorts);
+  if (!is_sent(socket, message, {memory_->board().get(), memory_->registry().get()})) return false;
   for (const auto& page : memory_->pages_at_hand()) {
     message = {};
     message.kind = wire::MessageKind::kHandBackPage;
     message.id = page.source;
     message.value = page.number;
-    if (!hand_back(message, {page.descriptor, -1})) return false;
+    if (!is_sent(socket, message, {page.descriptor, -1})) return false;
   }
-  for (const auto& [instance, core] : outputs_) {
-    const std::uint32_t flags = core->yields() ? wire::kYields : 0u;
-    if (!hand_back(wire::MessageKind::kHandBackOutput, *core, core->source(), flags,
-                   core->page_descriptor())) {
-      return false;
-    }
+  return true;
+}
+
+bool NodeCore::hand_back(const shm::FileDescriptor& socket,
+                         const std::vector<PortAtHand>& ports) const {
+  if (!hand_back_memory(socket, !ports.empty())) return false;
+  for (const PortAtHand& port : ports) {
+    if (!is_handed_back(socket, port)) return false;
   }
-  for (const auto& [instance, core] : inputs_) {
-    core->set_measured(false);  // unless the next daemon says so
-    if (!hand_back(wire::MessageKind::kHandBackInput, *core, core->port(), 0,
-                   core->bell().for_publishers())) {
-      return false;
-    }
-  }
-  message = {};
+  wire::Message message;
   message.kind = wire::MessageKind::kHandedBack;
-  return hand_back(message);
+  return is_sent(socket, message);
 }
 
 void NodeCore::be_welcomed(wire::Received& welcome) {

@@ -3,7 +3,6 @@
 
 #include <fcntl.h>
 #include <gtest/gtest.h>
-#include <poll.h>
 #include <sys/resource.h>
 #include <sys/socket.h>
 #include <unistd.h>
@@ -20,8 +19,6 @@
 #include "tests/client/models.hpp"
 #include "tests/client/samples.hpp"
 #include "tests/support/daemon.hpp"
-#include "wire/messages.hpp"
-#include "wire/rendezvous.hpp"
 
 namespace arbiter::test {
 namespace {
@@ -159,36 +156,6 @@ TEST(Outbox, OfANodeThatEndsLeavesNoPortOpen) {
   daemon.process().resume();
   node.emplace("next", silent_options());
   for (int i = 0; i < kManyPorts; ++i) ports.push_back(node->output_port(name_of_port(i)));
-}
-
-// The next daemon is there, and reads nothing yet.
-TEST(Outbox, OfANodeThatComesBackHoldsNobodyUpAndLosesNothing) {
-  raise_descriptor_limit();
-  Daemon daemon(single_model());
-  NodeOptions options = silent_options();
-  options.service_thread = false;
-  Node node("test", options);
-  std::vector<OutputPort<void>> ports;
-  for (int i = 0; i < kManyPorts; ++i) ports.push_back(node.output_port(name_of_port(i)));
-  daemon.kill();
-  const wire::Listener next = wire::listen_at(daemon.directory() + "/arbiter", daemon.instance());
-  pollfd comes{next.socket.get(), POLLIN, 0};
-  while (::poll(&comes, 1, 1) == 0) node.service();
-  const shm::FileDescriptor socket(::accept4(next.socket.get(), nullptr, nullptr, SOCK_CLOEXEC));
-  // More than a socket has room for waits while the node goes on.
-  int handed_back = 0;
-  for (bool is_all = false; !is_all;) {
-    node.service();
-    wire::Received received;
-    auto result = wire::ReceiveResult::kReceived;
-    while ((result = wire::receive_message(socket.get(), received, false)) ==
-           wire::ReceiveResult::kReceived) {
-      handed_back += received.message.kind == wire::MessageKind::kHandBackOutput;
-      is_all = received.message.kind == wire::MessageKind::kHandedBack;
-    }
-    ASSERT_EQ(result, wire::ReceiveResult::kNothing) << "the node has given up";
-  }
-  EXPECT_EQ(handed_back, kManyPorts);
 }
 
 }  // namespace
