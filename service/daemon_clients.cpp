@@ -164,10 +164,11 @@ void Daemon::drop(ClientId id) {
   left_unread_.add(client->release_unread());
 }
 
-// It finds nothing of who has opened a port meanwhile. Whoever is stopped is late again and again.
+// It finds nothing of who has opened a port meanwhile. Whoever is stopped is late again and again;
+// who waits for its turn may have answered.
 void Daemon::note_late(ClientId id, shm::Nanoseconds now) {
   Client* const client = clients_.find(id);
-  if (client == nullptr) return;
+  if (client == nullptr || client->has_turn) return;
   if (client->late_told_at != 0 && now - client->late_told_at < kTellLateEvery) return;
   client->late_told_at = now;
   const LogAccount account(client->user());

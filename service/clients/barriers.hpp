@@ -10,6 +10,7 @@
 #include "service/clients/client.hpp"
 #include "shm/activity.hpp"
 #include "shm/assertion.hpp"
+#include "shm/clock.hpp"
 
 namespace arbiter::service {
 
@@ -23,7 +24,7 @@ class Barriers {
   void raise(const std::set<Client*>& clients, shm::Nanoseconds deadline,
              std::function<void()> passed) {
     const std::uint64_t number = ++last_;
-    Barrier barrier{{}, deadline, std::move(passed)};
+    Barrier barrier{{}, deadline, shm::monotonic_now(), std::move(passed)};
     for (Client* client : clients) {
       if (!client->has_service_thread) continue;
       wire::Message sync;
@@ -59,13 +60,14 @@ class Barriers {
     return next;
   }
 
-  // Returns who is not waited for any longer.
+  // Returns who is not waited for any longer, and has had time to answer.
   std::set<ClientId> expire(shm::Nanoseconds now) {
     std::set<std::uint64_t> numbers;
     std::set<ClientId> late;
     for (auto& [number, barrier] : barriers_) {
       if (barrier.deadline > now) continue;
-      late.merge(barrier.waiting);
+      // Who was asked when the time was nearly over has had none.
+      if (now - barrier.asked >= kMaxWaitForClients / 2) late.merge(barrier.waiting);
       barrier.waiting.clear();
       numbers.insert(number);
     }
@@ -77,6 +79,7 @@ class Barriers {
   struct Barrier {
     std::set<ClientId> waiting;
     shm::Nanoseconds deadline;
+    shm::Nanoseconds asked;
     std::function<void()> passed;
   };
 

@@ -202,5 +202,37 @@ TEST(Introductions, SayInTheLogOnceForWhomTheyDoNotWait) {
   EXPECT_EQ(log.find(late, told + 1), std::string::npos) << log;
 }
 
+// They are asked a second time once all have answered, or the time is over.
+TEST(Introductions, AccuseNobodyWhoWasAskedWhenTheTimeWasOver) {
+  Daemon daemon(
+      "<behaviors><arbiter at='/in'><select from='/out'/></arbiter>"
+      "<arbiter at='/well'><select from='/out'/></arbiter></behaviors>");
+  const auto segment = raw_output_segment();
+  const auto inbox = raw_input_segment();
+  const auto other_inbox = raw_input_segment();
+  const shm::Bell bell;
+  RawClient late(daemon.instance());
+  late.hello("late", wire::kHasServiceThread);
+  late.send(RawClient::message(MessageKind::kOpenInput, "/in"),
+            {inbox.get(), bell.write_end().get()});
+  late.expect(MessageKind::kConnected);
+  RawClient well(daemon.instance());
+  well.hello("well", wire::kHasServiceThread);
+  well.send(RawClient::message(MessageKind::kOpenInput, "/well"),
+            {other_inbox.get(), bell.write_end().get()});
+  well.expect(MessageKind::kConnected);
+  RawClient sender(daemon.instance());
+  sender.hello();
+  sender.send(RawClient::message(MessageKind::kOpenOutput, "/out"), {segment.get(), -1});
+  answer_sync(well, well.expect(MessageKind::kSync).message);
+  sender.expect(MessageKind::kConnected);
+  daemon.terminate();
+  const std::string log = daemon.log();
+  const auto told = log.find(" has not answered for 0.2 s");
+  ASSERT_NE(told, std::string::npos) << log;
+  EXPECT_NE(log.rfind("node \"late\" (pid ", told), std::string::npos) << log;
+  EXPECT_EQ(log.find(" has not answered ", told + 1), std::string::npos) << log;
+}
+
 }  // namespace
 }  // namespace arbiter::test
