@@ -206,7 +206,7 @@ std::string Sampler::cause_of(shm::PortId port, std::uint64_t generation_before,
   const auto was = [this](shm::SourceId source) { return before_.is_active(source); };
   const auto is = [this](shm::SourceId source) { return last_.is_active(source); };
   const auto causes = rules::causes_of_change(table, port, was, is);
-  at = last_.selected_since(before_, port, causes);
+  at = last_.selected_since(before_, port);
   std::string text;
   for (const shm::SourceId source : causes) {
     // A table that is not whole may name any source: take_seats() forgets what is said of that.

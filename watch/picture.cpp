@@ -61,8 +61,11 @@ shm::Nanoseconds Picture::changed_at(shm::SourceId source) const {
 }
 
 // One by one the causes are taken back, the latest first.
-shm::Nanoseconds Picture::selected_since(const Picture& before, shm::PortId port,
-                                         std::vector<shm::SourceId> causes) const {
+shm::Nanoseconds Picture::selected_since(const Picture& before, shm::PortId port) const {
+  std::vector<shm::SourceId> causes;  // each that has changed, not one that would have been enough
+  for (const shm::SourceId source : rules::sources_heeded(snapshot.table, port)) {
+    if (is_active(source) != before.is_active(source)) causes.push_back(source);
+  }
   std::sort(causes.begin(), causes.end(),
             [this](auto one, auto other) { return changed_at(one) < changed_at(other); });
   const auto without = [&](shm::SourceId source) {

@@ -35,9 +35,8 @@ struct Picture {
   // the picture, as where a table that is being overwritten names any.
   [[nodiscard]] shm::Nanoseconds changed_at(shm::SourceId source) const;
   // Since when the port has selected what it does, where that was another source in the picture
-  // `before`, by the same model: the change of `causes` made it so.
-  [[nodiscard]] shm::Nanoseconds selected_since(const Picture& before, shm::PortId port,
-                                                std::vector<shm::SourceId> causes) const;
+  // `before`, by the same model.
+  [[nodiscard]] shm::Nanoseconds selected_since(const Picture& before, shm::PortId port) const;
   [[nodiscard]] bool is_unseen(shm::SourceId source) const;
   // The source that the port selects by the rules; kNone: none, or the port is not arbitrated. The
   // picture must be of all sources that the port heeds.

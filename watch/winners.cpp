@@ -3,7 +3,6 @@
 #include <set>
 #include <utility>
 
-#include "rules/explain/change.hpp"
 #include "rules/explain/tenure.hpp"
 
 namespace arbiter::watch {
@@ -76,11 +75,7 @@ shm::Nanoseconds Winners::time_of(const WinnerAt& change, shm::PortId port,
   if (change.is_first || picture.snapshot.generation != picture_.snapshot.generation) {
     return picture.now;
   }
-  const shm::TableView& table = picture.snapshot.table;
-  const auto causes = rules::causes_of_change(
-      table, port, [this](shm::SourceId source) { return picture_.is_active(source); },
-      [&](shm::SourceId source) { return picture.is_active(source); });
-  return picture.selected_since(picture_, port, causes);
+  return picture.selected_since(picture_, port);
 }
 
 }  // namespace arbiter::watch

@@ -79,5 +79,29 @@ TEST(Winners, WinSinceTheyBeganHoweverLateThatIsSeen) {
   EXPECT_LE(news[1].time, after);
 }
 
+// Each of the two changes would have been enough: the first was.
+TEST(Winners, EndWithTheFirstChangeThatEndsThem) {
+  Daemon daemon(R"(<behaviors timeout="forever">
+  <arbiter at="/in"><select from="/low">not /stop</select></arbiter>
+</behaviors>
+)");
+  Node node("test");
+  auto low = node.output_port<int>("/low");
+  auto stop = node.output_port<int>("/stop");
+  const auto instance = watched(daemon);
+  watch::Winners winners(instance, [](std::string_view) { return true; });
+  for (const bool stop_is_first : {true, false}) {
+    stop.deactivate();
+    low.publish(1);
+    winners.look();
+    stop_is_first ? static_cast<void>(stop.publish(1)) : low.deactivate();
+    const shm::Nanoseconds between = shm::monotonic_now();
+    stop_is_first ? low.deactivate() : static_cast<void>(stop.publish(1));
+    const auto news = winners.look();
+    ASSERT_EQ(news.size(), 1u);
+    EXPECT_LE(news[0].time, between);
+  }
+}
+
 }  // namespace
 }  // namespace arbiter::test
