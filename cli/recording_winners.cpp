@@ -273,8 +273,9 @@ void warn_of_gaps(const Recorded& recorded) {
                        [](const Missed& one, const Missed& other) { return one.to < other.to; });
   const shm::Nanoseconds offset = recorded.about.wall_offset;
   std::cerr << "arbiter: the recorder missed " << evidence::missed_text(recorded)
-            << ": who commanded is uncertain in " << rules::counted(gaps.size(), "gap") << ", "
-            << clock_text(first->from + offset) << " to " << clock_text(last->to + offset) << '\n';
+            << ": who commanded is uncertain in " << rules::counted(gaps.size(), "gap")
+            << (gaps.size() == 1 ? " from " : " between ") << clock_text(first->from + offset)
+            << (gaps.size() == 1 ? " to " : " and ") << clock_text(last->to + offset) << '\n';
 }
 
 int show_winners(const RecordedWinners& options) {

@@ -101,26 +101,27 @@ class Reading {
     ++result_.records;
     if (is_event && payloads_ == Payloads::pass_over_with_events) {
       passed_kind_ = kind->second;
+      passed_number_ = result_.records;
       passed_ = text;
       return;
     }
     hand_on_passed();
-    read(kind->second, text);
+    read(kind->second, text, result_.records);
   }
 
-  void read(RecordKind kind, std::string_view text) {
+  void read(RecordKind kind, std::string_view text, std::uint64_t number) {
     hand_on();
     try {
       waiting_ = read_record(kind, text, contexts_);
     } catch (const RecordError& error) {
-      throw RecordError(path_ + ": record " + std::to_string(result_.records) + ", of topic " +
+      throw RecordError(path_ + ": record " + std::to_string(number) + ", of topic " +
                         std::string(record_schemas[static_cast<std::size_t>(kind)].topic) + ": " +
                         error.what());
     }
   }
 
   void hand_on_passed() {
-    if (!passed_.empty()) read(passed_kind_, std::exchange(passed_, ""));
+    if (!passed_.empty()) read(passed_kind_, std::exchange(passed_, ""), passed_number_);
   }
 
   // It stands directly behind its arrival.
@@ -151,6 +152,7 @@ class Reading {
   Contexts contexts_;
   std::optional<Record> waiting_;
   RecordKind passed_kind_{};
+  std::uint64_t passed_number_ = 0;
   std::string passed_;  // the last event that was passed over; empty: none
 };
 

@@ -129,7 +129,11 @@ class Loader {
   // Of what was overtaken a state says where it goes on.
   void add(Missed&& each) {
     run().lost_samples += each.samples;
-    if (each.events != 0 && each.from != 0) run().gaps.push_back(each);
+    if (each.events != 0) {
+      run().gaps.push_back(each);
+      Nanoseconds& since = run().gaps.back().from;
+      if (since == 0) since = run().start;
+    }
     if (each.why != Missed::Why::refused) return;
     Nanoseconds& from = run().sources[each.source].unknown_from;
     from = std::min(from, each.from);

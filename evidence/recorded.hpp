@@ -57,7 +57,8 @@ struct Run {
   std::vector<PortChange> port_changes;         // of input ports, as they were recorded
   // Of output ports, by name, as they were recorded.
   std::map<std::string, std::vector<PortChange>> output_changes;
-  std::vector<Missed> gaps;        // in which events are missing, since a time that is known
+  // In which events are missing: from its start, where nothing of the source was known before.
+  std::vector<Missed> gaps;
   std::uint64_t lost = 0;          // events
   std::uint64_t left_out = 0;      // arrivals of another memory, that of the next run
   std::uint64_t lost_samples = 0;  // whose arrival is there, but not what was in them

@@ -252,7 +252,7 @@ TEST(RecordedWinners, DoNotTakeWhatWasMissedForSilence) {
               testing::ContainsRegex("idle .*: /low went inactive, unless it arrived in what was "
                                      "missed\n.*: noticed late\n.*: /low went inactive\n"));
   EXPECT_THAT(result.err, testing::HasSubstr("missed 9 events: who commanded is uncertain in 1 "
-                                             "gap, "));
+                                             "gap from "));
   const auto found = nlohmann::json::parse(arbiter({"recording", "winners", "--json", file}).out);
   EXPECT_EQ(found[1]["is_in_gap"], false);
   EXPECT_EQ(found[2]["is_in_gap"], true);
