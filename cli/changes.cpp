@@ -12,6 +12,7 @@
 
 #include "cli/live.hpp"
 #include "rules/text/names.hpp"
+#include "shm/utf8.hpp"
 #include "watch/model_in_force.hpp"
 #include "wire/call.hpp"
 #include "wire/document.hpp"
@@ -36,7 +37,7 @@ void write_in_force(const wire::ChangeReport& report) {
 }
 
 // Those of the input ports that somebody has open, after a text that says what is wrong with them.
-void write_open(const std::string& verb, const std::string& instance, const char* what,
+void write_open(const std::string& verb, const std::string& instance, const std::string& what,
                 const auto& is_wrong) {
   std::vector<std::string> names;
   try {
@@ -49,14 +50,11 @@ void write_open(const std::string& verb, const std::string& instance, const char
   if (!names.empty()) std::cout << "  " << what << ": " << rules::enumerate(names) << '\n';
 }
 
-// Ports that the model in force has and the files lack, by the report of a dry run.
-std::set<std::string> dropped_ports(const nlohmann::json& report) {
+// Ports that the files of a model drop, by the report of a dry run.
+std::set<std::string> dropped_ports(const nlohmann::json& model) {
   std::set<std::string> ports;
-  for (const auto& model : report.at("models")) {
-    if (!model.at("in_force").get<bool>() || model.at("changes").is_null()) continue;
-    for (const auto& port : model.at("changes").at("diff").at("ports")) {
-      if (!port.at("after").at("exists").get<bool>()) ports.insert(port.at("port"));
-    }
+  for (const auto& port : model.at("changes").at("diff").at("ports")) {
+    if (!port.at("after").at("exists").get<bool>()) ports.insert(port.at("port"));
   }
   return ports;
 }
@@ -140,11 +138,16 @@ wire::ChangeReport ask_for_change(const std::string& verb, const std::string& in
 
 void write_dropped(const std::string& verb, const std::string& instance,
                    const nlohmann::json& report) {
-  const std::set<std::string> dropped = dropped_ports(report);
-  if (dropped.empty()) return;
-  write_open(verb, instance,
-             "open now, and not mentioned by these files, so that no sample would arrive",
-             [&](const wire::InputStatus& port) { return dropped.contains(port.name); });
+  for (const auto& model : report.at("models")) {
+    if (!model.at("in_force").get<bool>() || model.at("changes").is_null()) continue;
+    const std::set<std::string> dropped = dropped_ports(model);
+    if (dropped.empty()) continue;
+    write_open(verb, instance,
+               "open now, and no longer mentioned by the files of model " +
+                   rules::quote(shm::printable(model.at("name").get<std::string>())) +
+                   ", so that no sample would arrive",
+               [&](const wire::InputStatus& port) { return dropped.contains(port.name); });
+  }
 }
 
 int change_model(const std::string& verb, const std::string& instance,

@@ -18,7 +18,8 @@ wire::ChangeReport ask_for_change(const std::string& verb, const std::string& in
                                   wire::Message question, bool json,
                                   nlohmann::json* whole = nullptr);
 
-// Of the ports that the files of a dry run drop, those that somebody has open.
+// Of the input ports that the files of a dry run drop from the model in force, those that somebody
+// has open.
 void write_dropped(const std::string& verb, const std::string& instance,
                    const nlohmann::json& report);
 

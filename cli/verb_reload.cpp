@@ -23,8 +23,9 @@ struct ReloadOptions {
 
 // One model of several, in a dry run.
 void write_changes(const wire::ModelComparison& model, bool is_alone) {
-  if (!is_alone) std::cout << model.name << (model.in_force ? " (in force)" : "") << ": ";
-  std::cout << (model.changes ? model.changes->text
+  if (!is_alone) std::cout << model.name << (model.in_force ? " (in force): " : ": ");
+  std::cout << (!is_alone && model.changes ? "\n" : "")
+            << (model.changes ? model.changes->text
                               : "not compared: the model in force comes from an earlier daemon\n");
 }
 

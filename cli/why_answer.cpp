@@ -12,6 +12,7 @@
 #include "cli/why_imports.hpp"
 #include "cli/why_report.hpp"
 #include "cli/why_summary.hpp"
+#include "command_line/shell_word.hpp"
 #include "rules/text/names.hpp"
 #include "watch/slow_publishers.hpp"
 
@@ -32,7 +33,7 @@ constexpr std::size_t kMaxTakenApart = 3;
 void refuse_source(const std::string& name, watch::Instance& instance) {
   if (instance.find_port(name)) return;
   const wire::Status status = instance.status();
-  if (status.find_source(name) == nullptr) return;
+  if (status.find_source(name) == nullptr || status.find_input(name) != nullptr) return;
   const auto has_it = [&](const auto& each) { return each.source == name; };
   std::vector<std::string> connected, read;
   for (const wire::InputStatus& input : status.inputs) {
@@ -42,12 +43,15 @@ void refuse_source(const std::string& name, watch::Instance& instance) {
       read.push_back(input.name);
     }
   }
-  if (connected.empty() && read.empty()) return;
   std::string text = name + " is an output port";
+  if (connected.empty() && read.empty()) {
+    throw watch::WatchError(text + ", of which the model in force reads and selects nothing");
+  }
   if (!connected.empty()) text += ", connected to " + rules::enumerate(connected);
   if (!read.empty()) text += ", read at " + rules::enumerate(read);
   throw watch::WatchError(text + "; give the input port first: arbiter why " +
-                          (connected.empty() ? read : connected).front() + ' ' + name);
+                          command_line::shell_word((connected.empty() ? read : connected).front()) +
+                          ' ' + command_line::shell_word(name));
 }
 
 bool is_open_in(const wire::Status& status, const std::string& port) {

@@ -21,7 +21,8 @@ using Json = nlohmann::ordered_json;
 
 // Of one code. What is true of each of a thousand ports is read of a few.
 constexpr std::size_t kMaxNotesShown = 10;
-// Of more than these that say the same of other names, one is shown, and the places of the others.
+// Of more than these that say the same of other names, few or many, one is shown, and the places of
+// the others.
 constexpr std::size_t kMaxAlikeShown = 4;
 
 const char* name_of(Severity severity) {
@@ -162,7 +163,7 @@ using Alike = std::vector<const Diagnostic*>;
 
 std::string group_of(const Diagnostic& item) { return item.code + '\n' + frame_of(item.message); }
 
-// Notes of one code that differ in names only.
+// Notes of one code that differ in names, and in how many there are, only.
 std::map<std::string, Alike> groups_of_notes(const std::vector<const Diagnostic*>& items) {
   std::map<std::string, Alike> groups;
   for (const Diagnostic* item : items) {
@@ -172,9 +173,9 @@ std::map<std::string, Alike> groups_of_notes(const std::vector<const Diagnostic*
   return groups;
 }
 
-// "12 more like it: line 7 (/Arm/pos:i), b.xml:3:5 (/Head/gaze:i), …".
+// "12 more of this kind, each with its own names: line 7 (/Arm/pos:i), b.xml:3:5 (/Torso/pos:i)".
 void write_others(std::ostream& out, const Alike& alike) {
-  out << "  and " << alike.size() - 1 << " more like it: ";
+  out << "  and " << alike.size() - 1 << " more of this kind, each with its own names: ";
   const std::size_t listed = std::min(alike.size(), kMaxNotesShown);
   for (std::size_t i = 1; i < listed; ++i) {
     const Location& where = alike[i]->where;

@@ -72,8 +72,8 @@ TEST(Unmentioned, AChangeNamesInputPortsThatGetNothingFromNowOn) {
       "<behaviors><behavior name='A'><config at='/Arm/pos:i'>/a:o</config>"
       "</behavior></behaviors>");
   EXPECT_THAT(arbiter({"reload", "--dry-run"}).out,
-              HasSubstr("\n  open now, and not mentioned by these files, so that no sample would "
-                        "arrive: /Gaze/pos:i\nthis was a dry run"));
+              HasSubstr("\n  open now, and no longer mentioned by the files of model \"default\", "
+                        "so that no sample would arrive: /Gaze/pos:i\nthis was a dry run"));
   EXPECT_THAT(arbiter({"reload"}).out,
               HasSubstr("\n  open, but not mentioned by this model, so that no sample arrives: "
                         "/Gaze/pos:i\n"));

@@ -123,13 +123,15 @@ TEST(Report, ShowsOneOfManyNotesThatDifferInNamesOnlyAndThePlacesOfTheOthers) {
   EXPECT_EQ(printed(diagnostics),
             "m.xml:1:1: note: with /x active, nobody wins at /a:i (one of 1 causes); connect "
             "\"Rest /a:i\" there [n]\n"
-            "  and 4 more like it: line 2 (/b:i), line 3 (/c:i), line 4 (/d:i), k.xml:6:1 (/e:i); "
+            "  and 4 more of this kind, each with its own names: line 2 (/b:i), line 3 (/c:i), "
+            "line 4 (/d:i), k.xml:6:1 (/e:i); "
             "arbiter check --json has each\n"
             "m.xml:5:1: note: with /x active, nobody wins at /a:i; connect it [other]\n"
             "6 notes\n");
   for (std::uint32_t line = 7; line < 17; ++line) add("m.xml", line, "/f:i", "/x");
   EXPECT_THAT(printed(diagnostics),
-              testing::HasSubstr("  and 14 more like it: line 2 (/b:i), line 3 (/c:i), line 4 "
+              testing::HasSubstr("  and 14 more of this kind, each with its own names: line 2 "
+                                 "(/b:i), line 3 (/c:i), line 4 "
                                  "(/d:i), line 7 (/f:i), line 8 (/f:i), line 9 (/f:i), line 10 "
                                  "(/f:i), line 11 (/f:i), line 12 (/f:i), …; arbiter check"));
   EXPECT_EQ(json_of(diagnostics).size(), 16u);
