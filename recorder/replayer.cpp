@@ -221,6 +221,9 @@ void Replayer::open_ports() {
   for (const std::string& name : announced) sources_.erase(name);
   options_.say("not published, for a component there announces who commands: " +
                rules::enumerate(announced));
+  if (sources_.empty()) {
+    throw NothingChosen(options_.file + " has no other arrival of what you have chosen");
+  }
 }
 
 Replayed Replayer::run(const shm::FileDescriptor& interrupts) {

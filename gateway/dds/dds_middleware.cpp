@@ -253,6 +253,7 @@ bool DdsMiddleware::has_joined(Site& site) {
     return false;
   }
   site.domain = site.joining.get();
+  site.joiner = {};
   hold_low_descriptors();
   return true;
 }
