@@ -21,12 +21,17 @@ struct ReloadOptions {
   bool json = false;
 };
 
-// One model of several, in a dry run.
+// One model of several, in a dry run. A difference begins with a line of its own.
 void write_changes(const wire::ModelComparison& model, bool is_alone) {
-  if (!is_alone) std::cout << model.name << (model.in_force ? " (in force): " : ": ");
-  std::cout << (!is_alone && model.changes ? "\n" : "")
-            << (model.changes ? model.changes->text
-                              : "not compared: the model in force comes from an earlier daemon\n");
+  const std::string text = model.changes
+                               ? model.changes->text
+                               : "not compared: the model in force comes from an earlier daemon\n";
+  const bool is_one_line = text.find('\n') + 1 == text.size();
+  if (!is_alone) {
+    std::cout << model.name << (model.in_force ? " (in force):" : ":")
+              << (is_one_line ? ' ' : '\n');
+  }
+  std::cout << text;
 }
 
 int reload(const ReloadOptions& options) {

@@ -197,7 +197,7 @@ TEST_F(ChangingModels, ADryRunShowsWhatAReloadWouldDo) {
   write_other(only("d"));
   result = arbiter({"reload", "--dry-run"});
   EXPECT_EQ(result.exit_code, 0) << result.err;
-  EXPECT_THAT(result.out, AllOf(HasSubstr("other (in force): "), HasSubstr("/d"),
+  EXPECT_THAT(result.out, AllOf(HasSubstr("other (in force):\n/in\n"), HasSubstr("/d"),
                                 HasSubstr("1 of 1 port decides differently (/in)")));
   const auto report = nlohmann::json::parse(arbiter({"reload", "--dry-run", "--json"}).out);
   EXPECT_EQ(report["ok"], true);
