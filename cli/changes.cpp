@@ -5,7 +5,6 @@
 #include <set>
 #include <string>
 #include <string_view>
-#include <utility>
 #include <vector>
 
 #include <nlohmann/json.hpp>
@@ -48,15 +47,6 @@ void write_open(const std::string& verb, const std::string& instance, const std:
     return;  // who may change the model need not be allowed to observe
   }
   if (!names.empty()) std::cout << "  " << what << ": " << rules::enumerate(names) << '\n';
-}
-
-// Ports that the files of a model drop, by the report of a dry run.
-std::set<std::string> dropped_ports(const nlohmann::json& model) {
-  std::set<std::string> ports;
-  for (const auto& port : model.at("changes").at("diff").at("ports")) {
-    if (!port.at("after").at("exists").get<bool>()) ports.insert(port.at("port"));
-  }
-  return ports;
 }
 
 void add_files(const wire::LoadedModelStatus& model, std::set<std::string>& files) {
@@ -115,18 +105,17 @@ void name_files_from_here(wire::ChangeReport& report, const nlohmann::json& docu
 }  // namespace
 
 wire::ChangeReport ask_for_change(const std::string& verb, const std::string& instance,
-                                  wire::Message question, bool json, nlohmann::json* whole) {
+                                  wire::Message question, bool json) {
   question.flags |= wire::kWantsReport;
   wire::Call daemon(caller(verb, instance));
   const std::string text = wire::change_report_text(daemon.ask(question));
   wire::ChangeReport report = wire::read_change_report(text);
-  nlohmann::json document = wire::parse_document(text);
+  const nlohmann::json document = wire::parse_document(text);
   if (json) {
     std::cout << wire::write_document(document);
     return report;
   }
   name_files_from_here(report, document, verb, instance);
-  if (whole != nullptr) *whole = std::move(document);
   std::cerr << report.text;
   if (report.has_errors) {
     std::cerr << "arbiter: refused; nothing has changed\n";
@@ -137,17 +126,18 @@ wire::ChangeReport ask_for_change(const std::string& verb, const std::string& in
 }
 
 void write_dropped(const std::string& verb, const std::string& instance,
-                   const nlohmann::json& report) {
-  for (const auto& model : report.at("models")) {
-    if (!model.at("in_force").get<bool>() || model.at("changes").is_null()) continue;
-    const std::set<std::string> dropped = dropped_ports(model);
-    if (dropped.empty()) continue;
-    write_open(verb, instance,
-               "open now, and no longer mentioned by the files of model " +
-                   rules::quote(shm::printable(model.at("name").get<std::string>())) +
-                   ", so that no sample would arrive",
-               [&](const wire::InputStatus& port) { return dropped.contains(port.name); });
+                   const wire::ModelComparison& model) {
+  std::set<std::string> dropped;
+  if (model.changes && model.changes->diff) {
+    for (const wire::PortDifference& each : model.changes->diff->ports) {
+      if (!each.after.exists) dropped.insert(each.port);
+    }
   }
+  if (dropped.empty()) return;
+  write_open(verb, instance,
+             "open now, and no longer mentioned by the files of model " +
+                 rules::quote(shm::printable(model.name)) + ", so that no sample would arrive",
+             [&](const wire::InputStatus& port) { return dropped.contains(port.name); });
 }
 
 int change_model(const std::string& verb, const std::string& instance,

@@ -5,7 +5,6 @@
 #include <vector>
 
 #include <CLI/CLI.hpp>
-#include <nlohmann/json.hpp>
 
 #include "cli/changes.hpp"
 #include "cli/live.hpp"
@@ -39,12 +38,13 @@ int reload(const ReloadOptions& options) {
   question.kind = wire::MessageKind::kReload;
   question.flags = options.dry_run ? wire::kDryRun : 0u;
   if (!options.dry_run) return change_model("reload", options.instance, question, options.json);
-  nlohmann::json whole;
-  const auto report = ask_for_change("reload", options.instance, question, options.json, &whole);
+  const auto report = ask_for_change("reload", options.instance, question, options.json);
   if (options.json || !report.ok) return report.ok ? 0 : 1;
   const auto models = report.models.value_or(std::vector<wire::ModelComparison>());
   for (const auto& model : models) write_changes(model, models.size() == 1);
-  write_dropped("reload", options.instance, whole);
+  for (const auto& model : models) {
+    if (model.in_force) write_dropped("reload", options.instance, model);
+  }
   if (report.policy && report.policy->differs) {
     std::cout << "the policy " << report.policy->file << " differs from the one in force: it has "
               << rules::counted(report.policy->rules, "rule") << '\n';

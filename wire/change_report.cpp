@@ -8,9 +8,19 @@
 
 namespace arbiter::wire {
 
+void describe(auto& field, Is<PortDifference::Side> auto& of) { field("exists", of.exists); }
+
+void describe(auto& field, Is<PortDifference> auto& of) {
+  field("port", of.port);
+  field("after", of.after);
+}
+
+void describe(auto& field, Is<ModelDifference> auto& of) { field("ports", of.ports); }
+
 void describe(auto& field, Is<ModelChanges> auto& of) {
   field("summary", of.summary);
   field("text", of.text);
+  field.maybe("diff", of.diff);
 }
 
 void describe(auto& field, Is<ModelComparison> auto& of) {

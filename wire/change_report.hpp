@@ -14,10 +14,24 @@
 
 namespace arbiter::wire {
 
+// Of a port that is decided differently.
+struct PortDifference {
+  struct Side {
+    bool exists = false;  // the model mentions the port
+  };
+  std::string port;
+  Side after;
+};
+
+struct ModelDifference {
+  std::vector<PortDifference> ports;
+};
+
 // What is decided differently.
 struct ModelChanges {
   std::string summary;  // a line
   std::string text;     // as `arbiter diff` writes it
+  std::optional<ModelDifference> diff;
 };
 
 // One model, in a dry run.

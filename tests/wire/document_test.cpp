@@ -11,6 +11,7 @@
 
 #include "shm/segment.hpp"
 #include "tests/support/error_of.hpp"
+#include "wire/change_report.hpp"
 
 namespace arbiter::test {
 namespace {
@@ -57,6 +58,27 @@ TEST(Document, ThatIsNotUtf8IsRefused) {
 
 TEST(Document, IsWrittenWithWhatIsNotUtf8Replaced) {
   EXPECT_EQ(wire::write_document({{"a", "\xff"}}), "{\n  \"a\": \"\xEF\xBF\xBD\"\n}\n");
+}
+
+TEST(ChangeReport, HasTheDifferenceThatTheDaemonSent) {
+  const auto report_with = [](const std::string& changes) {
+    return wire::read_change_report(
+        R"({"ok": true, "has_errors": false, "text": "", "models": [{"name": "work", "in_force":
+           true, "changes": {"summary": "", "text": "")" +
+        changes + "}}]}");
+  };
+  EXPECT_FALSE(report_with("").models.value().at(0).changes.value().diff)
+      << "a daemon may not tell";
+  const auto report =
+      report_with(R"(, "diff": {"ports": [{"port": "/in", "after": {"exists": false}}]})");
+  const auto& ports = report.models.value().at(0).changes.value().diff.value().ports;
+  ASSERT_EQ(ports.size(), 1u);
+  EXPECT_EQ(ports[0].port, "/in");
+  EXPECT_FALSE(ports[0].after.exists);
+  EXPECT_THAT(error_of([&] {
+                static_cast<void>(report_with(R"(, "diff": {"ports": [{"port": "/in"}]})"));
+              }),
+              HasSubstr("after"));
 }
 
 }  // namespace
