@@ -259,23 +259,22 @@ void write_reigns(const std::vector<Reign>& reigns, const Gaps& gaps, shm::Nanos
 
 // When it was, so that it can be told whether it matters.
 void warn_of_gaps(const Recorded& recorded) {
-  using evidence::Missed;
-  std::vector<Missed> gaps;
+  std::size_t count = 0;
+  shm::Nanoseconds from = shm::kForever;
+  shm::Nanoseconds to = 0;
   for (const evidence::Run& run : recorded.runs) {
-    gaps.insert(gaps.end(), run.gaps.begin(), run.gaps.end());
+    count += run.gaps.size();
+    for (const evidence::Missed& gap : run.gaps) {
+      from = std::min(from, gap.from);
+      to = std::max(to, gap.to);
+    }
   }
-  if (gaps.empty()) return warn_of_missed(recorded);
-  const auto first = std::min_element(
-      gaps.begin(), gaps.end(),
-      [](const Missed& one, const Missed& other) { return one.from < other.from; });
-  const auto last =
-      std::max_element(gaps.begin(), gaps.end(),
-                       [](const Missed& one, const Missed& other) { return one.to < other.to; });
+  if (count == 0) return warn_of_missed(recorded);
   const shm::Nanoseconds offset = recorded.about.wall_offset;
   std::cerr << "arbiter: the recorder missed " << evidence::missed_text(recorded)
-            << ": who commanded is uncertain in " << rules::counted(gaps.size(), "gap")
-            << (gaps.size() == 1 ? " from " : " between ") << clock_text(first->from + offset)
-            << (gaps.size() == 1 ? " to " : " and ") << clock_text(last->to + offset) << '\n';
+            << ": who commanded is uncertain in " << rules::counted(count, "gap")
+            << (count == 1 ? " from " : " between ") << clock_text(from + offset)
+            << (count == 1 ? " to " : " and ") << clock_text(to + offset) << '\n';
 }
 
 int show_winners(const RecordedWinners& options) {
