@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "cli/why_elsewhere.hpp"
+#include "command_line/shell_word.hpp"
 #include "rules/text/names.hpp"
 #include "watch/port.hpp"
 #include "wire/hosts.hpp"
@@ -35,7 +36,8 @@ void write_others_with_port(std::ostream& out, const std::string& port, bool is_
     out << "  ! it is " << (is_open ? "also " : "") << "open on host " << host
         << (is_open ? ", and each of them decides it by itself: open it on one only; "
                     : ", which decides it for its component: ")
-        << "arbiter why " << port << " --host " << host << '\n';
+        << "arbiter why " << command_line::shell_word(port) << " --host "
+        << command_line::shell_word(host) << '\n';
   }
 }
 
