@@ -184,7 +184,8 @@ enum class ReceiveResult { kReceived, kNothing, kClosed, kMalformed };
 // What a call may wait at a socket that blocks, in seconds.
 inline constexpr int kMaxWaitToSend = 1;
 
-// Non-blocking unless the socket blocks; signals, too, may interrupt that for kMaxWaitToSend only.
+// Non-blocking unless the socket blocks; signals that interrupt it make that three times
+// kMaxWaitToSend at most.
 // Never raises SIGPIPE. What is received is all that came:
 // descriptors that the kernel finds no room for, it closes before recvmsg() returns, and to close a
 // stranger's may block. So there is room for as many as there can be.
