@@ -1,8 +1,5 @@
 #include "tests/fuzz/segments/world.hpp"
 
-#include <fcntl.h>
-#include <unistd.h>
-
 #include <algorithm>
 #include <cstddef>
 #include <cstdio>
@@ -21,8 +18,6 @@ namespace {
 
 enum : std::uint32_t { kP, kH, kS, kSources };
 enum : std::uint32_t { kR, kR2, kX, kPorts };
-
-shm::FileDescriptor copy_of(int fd) { return shm::FileDescriptor(::fcntl(fd, F_DUPFD_CLOEXEC, 0)); }
 
 struct Sample {
   std::uint64_t number;
@@ -102,11 +97,11 @@ shm::FileDescriptor World::make_page(bool hostile) {
 }
 
 std::shared_ptr<detail::SharedMemory> World::make_memory() {
-  auto memory = std::make_shared<detail::SharedMemory>(copy_of(board_.get()), shm::FileDescriptor(),
-                                                       std::make_shared<detail::ServiceBell>());
+  auto memory = std::make_shared<detail::SharedMemory>(
+      shm::duplicate(board_.get()), shm::FileDescriptor(), std::make_shared<detail::ServiceBell>());
   const char* const names[]{"/p", "/h", "/s"};
   for (std::uint32_t source = 0; source < kSources; ++source) {
-    memory->add_page(source, 1, names[source], copy_of(pages_[source].get()));
+    memory->add_page(source, 1, names[source], shm::duplicate(pages_[source].get()));
   }
   return memory;
 }
@@ -127,9 +122,9 @@ World::World(const Choices& choices)
   declare_hostile(h.segment_descriptor().get());
   declare_hostile(x.segment_descriptor().get());
   declare_hostile(y.segment_descriptor().get());
-  p.bind(++last_instance_, kP, copy_of(pages_[kP].get()));
-  s.bind(++last_instance_, kS, copy_of(pages_[kS].get()));
-  h.bind(++last_instance_, kH, copy_of(pages_[kH].get()));
+  p.bind(++last_instance_, kP, shm::duplicate(pages_[kP].get()));
+  s.bind(++last_instance_, kS, shm::duplicate(pages_[kS].get()));
+  h.bind(++last_instance_, kH, shm::duplicate(pages_[kH].get()));
   r.bind(++last_instance_, kR);
   r2.bind(++last_instance_, kR2);
   x.bind(++last_instance_, kX);
@@ -146,8 +141,8 @@ void World::connect(detail::OutputCore& from, detail::InputCore& to) {
   to_output.message.peer = to.instance();
   to_output.message.id = &to == &r ? kR : &to == &r2 ? kR2 : kX;
   to_output.message.flags = wire::kIsConnected;
-  to_output.descriptors[0] = copy_of(to.segment_descriptor().get());
-  to_output.descriptors[1] = copy_of(to.bell().write_end().get());
+  to_output.descriptors[0] = shm::duplicate(to.segment_descriptor().get());
+  to_output.descriptors[1] = shm::duplicate(to.bell().write_end().get());
   try {
     from.add_peer(detail::map_input_peer(to_output, type()), link);
   } catch (const std::runtime_error&) {  // others have taken up its max_memory
@@ -157,7 +152,7 @@ void World::connect(detail::OutputCore& from, detail::InputCore& to) {
   to_input.message.peer = from.instance();
   to_input.message.id = from.source();
   to_input.message.link = link;
-  to_input.descriptors[0] = copy_of(from.segment_descriptor().get());
+  to_input.descriptors[0] = shm::duplicate(from.segment_descriptor().get());
   to.add_peer(detail::map_output_peer(to_input, type()));
   show_growth(from);
 }
@@ -175,83 +170,6 @@ void World::disconnect(detail::OutputCore& from, detail::InputCore& to) {
   to.disconnect_peer(from.instance());
 }
 
-shm::FileDescriptor World::make_hostile(std::size_t size, const void* header,
-                                        std::size_t header_size, const std::vector<Patch>& patches,
-                                        const std::map<std::size_t, std::uint64_t>& words,
-                                        bool is_allocated) {
-  auto segment = shm::make_segment("hostile", size);
-  if (is_allocated && shm::allocate(segment, 0, size)) die("no memory");
-  std::vector<char> bytes(header_size);
-  std::memcpy(bytes.data(), header, header_size);
-  for (const Patch& patch : patches) {
-    const std::size_t at = patch.word % (header_size / sizeof patch.value) * sizeof patch.value;
-    std::memcpy(bytes.data() + at, &patch.value, sizeof patch.value);
-  }
-  const std::size_t used = std::min(header_size, size);
-  if (::pwrite(segment.get(), bytes.data(), used, 0) != static_cast<ssize_t>(used)) die("pwrite");
-  for (const auto& [at, value] : words) {
-    if (at + 8 <= size && ::pwrite(segment.get(), &value, 8, static_cast<off_t>(at)) != 8) {
-      die("pwrite");
-    }
-  }
-  shm::seal(segment, shm::Seals::kOneWriter);
-  declare_hostile(segment.get());
-  return segment;
-}
-
-void World::introduce_output(std::uint32_t slots, int more, const std::vector<Patch>& patches) {
-  const auto layout = shm::OutputLayout::plan(type(), slots);
-  shm::OutputHeader header{};
-  header.magic = shm::OutputHeader::kMagic;
-  header.version = shm::OutputHeader::kVersion;
-  header.slot_count = slots;
-  header.type = type();
-  wire::Received received;
-  received.message.peer = ++last_instance_;
-  received.message.id = kH;
-  received.message.link = ++last_link_;
-  // A queue for /r, with a sample in the last slot.
-  const std::size_t channel = layout.channels_offset;
-  const std::map<std::size_t, std::uint64_t> words{
-      {offsetof(shm::OutputHeader, joins), 1},
-      {channel + offsetof(shm::Channel, first), 1},
-      {channel + offsetof(shm::Channel, depth), 2},
-      {channel + offsetof(shm::Channel, accepted), 1},
-      {channel + offsetof(shm::Channel, receiver), received.message.link},
-      {layout.rings_offset +
-           received.message.link % (shm::kPageSize / shm::kCacheLine) * shm::kCacheLine,
-       shm::make_entry(1, slots - 1)}};
-  received.descriptors[0] =
-      make_hostile(layout.total_size + static_cast<std::size_t>(more), &header,
-                   offsetof(shm::OutputHeader, joins), patches, words);
-  try {
-    r.add_peer(detail::map_output_peer(received, type()));
-  } catch (const std::runtime_error&) {  // it says what is wrong with it
-  }
-}
-
-void World::introduce_input(const std::vector<Patch>& patches) {
-  shm::InputHeader header{};
-  header.magic = shm::InputHeader::kMagic;
-  header.version = shm::InputHeader::kVersion;
-  header.depth = 2;
-  header.max_held = 2;
-  header.type = type();
-  wire::Received received;
-  received.message.peer = ++last_instance_;
-  received.message.id = kX;
-  received.message.flags = wire::kIsConnected;
-  // It takes up whatever comes; what a step writes there later may say otherwise.
-  received.descriptors[0] =
-      make_hostile(sizeof(shm::InputSegment), &header, offsetof(shm::InputHeader, wait), patches,
-                   {{offsetof(shm::InputHeader, newest_link), UINT64_MAX}});
-  received.descriptors[1] = copy_of(x.bell().write_end().get());
-  try {
-    p.add_peer(detail::map_input_peer(received, type()), ++last_link_);
-  } catch (const std::runtime_error&) {
-  }
-}
-
 void World::watch() {
   t.bind(++last_instance_);
   y.bind(++last_instance_);
@@ -260,15 +178,15 @@ void World::watch() {
   watch(p, y);
   wire::Received to_tap;
   to_tap.message.peer = x.instance();
-  to_tap.descriptors[0] = copy_of(x.segment_descriptor().get());
+  to_tap.descriptors[0] = shm::duplicate(x.segment_descriptor().get());
   t.add_input(detail::map_tap_input(to_tap, shm::Residence::kMapped));
 }
 
 void World::watch(detail::OutputCore& from, detail::TapCore& by) {
   wire::Received to_output;
   to_output.message.peer = by.instance();
-  to_output.descriptors[0] = copy_of(by.segment_descriptor().get());
-  to_output.descriptors[1] = copy_of(by.bell().write_end().get());
+  to_output.descriptors[0] = shm::duplicate(by.segment_descriptor().get());
+  to_output.descriptors[1] = shm::duplicate(by.bell().write_end().get());
   const auto entry = from.add_tap(detail::map_tap_peer(to_output, shm::Residence::kMapped));
   if (&from == &h) declare_hostile(entry.memory->readable().get());
   show_growth(from);
@@ -278,57 +196,9 @@ void World::watch(detail::OutputCore& from, detail::TapCore& by) {
   to_tap.message.link = entry.link;
   to_tap.message.value = entry.place;
   to_tap.message.set_name(from.name());
-  to_tap.descriptors[0] = copy_of(from.segment_descriptor().get());
-  to_tap.descriptors[1] = copy_of(entry.memory->readable().get());
+  to_tap.descriptors[0] = shm::duplicate(from.segment_descriptor().get());
+  to_tap.descriptors[1] = shm::duplicate(entry.memory->readable().get());
   by.add_source(detail::map_tap_source(to_tap, type(), shm::Residence::kMapped));
-}
-
-void World::introduce_tap(const std::vector<Patch>& patches) {
-  shm::TapSegment segment{};
-  segment.magic = shm::TapSegment::kMagic;
-  segment.version = shm::TapSegment::kVersion;
-  segment.max_held = 1;
-  segment.sleeps = 1;
-  wire::Received received;
-  received.message.peer = ++last_instance_;
-  received.descriptors[0] =
-      make_hostile(sizeof segment, &segment, offsetof(shm::TapSegment, wait), patches, {}, true);
-  received.descriptors[1] = copy_of(y.bell().write_end().get());
-  try {
-    p.add_tap(detail::map_tap_peer(received, shm::Residence::kMapped));
-  } catch (const std::runtime_error&) {
-  }
-  show_growth(p);
-}
-
-void World::introduce_events(const std::vector<Patch>& patches) {
-  shm::EventHeader header{};
-  header.magic = shm::EventHeader::kMagic;
-  header.version = shm::EventHeader::kVersion;
-  header.shape = {4, 2, 2};
-  wire::Received received;
-  received.message.peer = ++last_instance_;
-  received.message.id = kH;
-  received.message.link = ++last_link_;
-  received.message.set_name("/h");
-  // Joined, and a sample that is kept.
-  const std::size_t event = offsetof(shm::EventSegment, events) + sizeof(shm::Event);
-  const std::map<std::size_t, std::uint64_t> words{
-      {offsetof(shm::EventSegment, places) + offsetof(shm::TapPlace, link), last_link_},
-      {offsetof(shm::EventSegment, places) + offsetof(shm::TapPlace, first), 1},
-      {offsetof(shm::EventSegment, kept) + sizeof(shm::Entry), shm::make_entry(1, 0)},
-      {event + offsetof(shm::Event, sample), shm::make_entry(1, 0)},
-      {event + offsetof(shm::Event, activity), shm::kForeverFlag},
-      {event + offsetof(shm::Event, revision_and_kind),
-       static_cast<std::uint64_t>(shm::EventKind::kSample)},
-      {event + offsetof(shm::Event, number), 2}};
-  received.descriptors[0] = copy_of(h.segment_descriptor().get());
-  received.descriptors[1] =
-      make_hostile(sizeof(shm::EventSegment), &header, sizeof header, patches, words, true);
-  try {
-    t.add_source(detail::map_tap_source(received, type(), shm::Residence::kMapped));
-  } catch (const std::runtime_error&) {
-  }
 }
 
 Outcome World::publish(detail::OutputCore& from, bool loan, std::uint32_t words) {
