@@ -29,7 +29,7 @@
 #include "rules/explain/trace.hpp"
 #include "rules/text/names.hpp"
 #include "shm/clock.hpp"
-#include "shm/picture.hpp"
+#include "shm/port_picture.hpp"
 #include "watch/instance.hpp"
 #include "watch/picture.hpp"
 

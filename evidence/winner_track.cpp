@@ -5,7 +5,7 @@
 #include <unordered_set>
 #include <utility>
 
-#include "shm/picture.hpp"
+#include "shm/port_picture.hpp"
 
 namespace arbiter::evidence {
 

@@ -15,7 +15,7 @@
 #include "gateway/core/turned_away.hpp"
 #include "link/core/host_card.hpp"
 #include "shm/clock.hpp"
-#include "shm/picture.hpp"
+#include "shm/port_picture.hpp"
 #include "watch/imported.hpp"
 #include "watch/picture.hpp"
 #include "wire/document.hpp"

@@ -13,7 +13,7 @@
 #include "rules/prove/compile.hpp"
 #include "rules/text/names.hpp"
 #include "shm/clock.hpp"
-#include "shm/picture.hpp"
+#include "shm/port_picture.hpp"
 
 namespace arbiter::recorder {
 namespace {

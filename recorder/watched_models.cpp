@@ -9,7 +9,7 @@
 #include "recorder/watcher.hpp"
 #include "rules/model/quantifiers.hpp"
 #include "shm/clock.hpp"
-#include "shm/picture.hpp"
+#include "shm/port_picture.hpp"
 
 namespace arbiter::recorder {
 namespace {

@@ -11,7 +11,7 @@
 #include "rules/text/names.hpp"
 #include "shm/clock.hpp"
 #include "shm/descriptor_limit.hpp"
-#include "shm/picture.hpp"
+#include "shm/port_picture.hpp"
 
 namespace arbiter::recorder {
 namespace {

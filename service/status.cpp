@@ -12,7 +12,7 @@
 
 #include "service/models/document.hpp"
 #include "shm/clock.hpp"
-#include "shm/picture.hpp"
+#include "shm/port_picture.hpp"
 #include "shm/utf8.hpp"
 #include "wire/document.hpp"
 #include "wire/status.hpp"

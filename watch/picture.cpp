@@ -6,7 +6,7 @@
 #include "rules/explain/tenure.hpp"
 #include "shm/clock.hpp"
 #include "shm/limits.hpp"
-#include "shm/picture.hpp"
+#include "shm/port_picture.hpp"
 #include "watch/sources.hpp"
 
 namespace arbiter::watch {

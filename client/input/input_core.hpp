@@ -23,7 +23,7 @@
 #include "shm/clock.hpp"
 #include "shm/descendants.hpp"
 #include "shm/input_segment.hpp"
-#include "shm/picture.hpp"
+#include "shm/port_picture.hpp"
 
 namespace arbiter::detail {
 

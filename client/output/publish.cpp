@@ -14,7 +14,7 @@
 
 #include "client/count.hpp"
 #include "client/output/output_core.hpp"
-#include "shm/picture.hpp"
+#include "shm/port_picture.hpp"
 #include "shm/prefetch.hpp"
 
 namespace arbiter::detail {

@@ -1,7 +1,7 @@
 #include "rules/explain/change.hpp"
 
 #include "rules/explain/tenure.hpp"
-#include "shm/picture.hpp"
+#include "shm/port_picture.hpp"
 
 namespace arbiter::rules {
 

@@ -11,7 +11,7 @@
 
 #include "rules/explain/trace.hpp"
 #include "rules/prove/compile.hpp"
-#include "shm/picture.hpp"
+#include "shm/port_picture.hpp"
 
 namespace arbiter::rules {
 

@@ -5,7 +5,7 @@
 #include <map>
 #include <set>
 
-#include "shm/picture.hpp"
+#include "shm/port_picture.hpp"
 
 namespace arbiter::rules {
 namespace {

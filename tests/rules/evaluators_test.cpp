@@ -39,7 +39,7 @@ class Evaluators {
  private:
   using Winner = std::optional<std::string>;
 
-  // shm/decision.hpp against shm/picture.hpp.
+  // shm/decision.hpp against shm/port_picture.hpp.
   void check_decisions(const std::string& port, const Active& active, const Winner& winner) {
     EXPECT_EQ(live_.winner(port), winner) << "each rule decided by itself";
     const auto picture = live_.picture(port);

@@ -12,7 +12,7 @@
 
 #include "rules/prove/compile.hpp"
 #include "rules/prove/flatten.hpp"
-#include "shm/picture.hpp"
+#include "shm/port_picture.hpp"
 
 namespace arbiter::test {
 
