@@ -10,8 +10,9 @@
 #include <utility>
 #include <vector>
 
-#include "evidence/record_reader.hpp"
+#include "evidence/record_error.hpp"
 #include "evidence/record_schemas.hpp"
+#include "evidence/records.hpp"
 #include "shm/limits.hpp"
 
 namespace arbiter::evidence {

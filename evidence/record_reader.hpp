@@ -5,19 +5,13 @@
 #include <cstdint>
 #include <functional>
 #include <optional>
-#include <stdexcept>
 #include <string>
 
+#include "evidence/record_error.hpp"
 #include "evidence/records.hpp"
 #include "recording/mcap.hpp"
 
 namespace arbiter::evidence {
-
-// The file is no recording, or one of a later version: says what and where.
-class RecordError : public std::runtime_error {
- public:
-  using std::runtime_error::runtime_error;
-};
 
 struct ReadRecording {
   std::string instance;

@@ -58,7 +58,14 @@ void Desk::add_verbs() {
 }
 
 void Desk::join(const Network& network, std::string name, const gateway::Bell& bell) {
-  auto topics = std::make_unique<Topics>(*this, network, bell);
+  using Writer = gateway::dds::SampleWriter;
+  auto topics = std::make_unique<DeskTopics>(
+      network, bell,
+      DeskTopics::Heard{
+          [this](Bytes bytes, const Writer& writer) { hear_card(bytes, writer); },
+          [this](Bytes bytes, const Writer& writer) { hear_pulse(bytes, writer.participant); },
+          [this](Bytes bytes, const Writer& writer) { hear_question(bytes, writer.handle); },
+          [this](Bytes bytes, const Writer& writer) { hear_answer(bytes, writer.participant); }});
   {
     const std::unique_lock using_topics(topics_mutex_);
     topics_ = std::move(topics);
@@ -80,7 +87,7 @@ void Desk::join(const Network& network, std::string name, const gateway::Bell& b
 
 void Desk::leave() {
   pulse_.reset();
-  std::unique_ptr<Topics> gone;
+  std::unique_ptr<DeskTopics> gone;
   {
     const std::unique_lock using_topics(topics_mutex_);
     gone = std::move(topics_);

@@ -39,6 +39,8 @@
 
 namespace arbiter::link {
 
+struct DeskTopics;
+
 // What the link's loop knows of its own host.
 struct OwnHost {
   HostCard card;  // but for who this link is
@@ -77,8 +79,6 @@ class Desk {
   [[nodiscard]] Answers& answers() noexcept { return answers_; }
 
  private:
-  struct Topics;
-
   void add_verbs();
   void open_socket();
   void send_card();
@@ -155,7 +155,7 @@ class Desk {
   std::string said_;
 
   // Destroyed in reverse: callers go before what they call.
-  std::unique_ptr<Topics> topics_;
+  std::unique_ptr<DeskTopics> topics_;
   std::thread answering_;
   std::unique_ptr<TokenClock> pulse_;
   std::unique_ptr<LocalSocket> socket_;

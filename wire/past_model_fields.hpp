@@ -2,7 +2,7 @@
 #pragma once
 
 #include "wire/fields.hpp"
-#include "wire/status.hpp"
+#include "wire/past_model.hpp"
 
 namespace arbiter::wire {
 

@@ -16,6 +16,7 @@
 #include <nlohmann/json_fwd.hpp>
 
 #include "shm/activity.hpp"
+#include "wire/past_model.hpp"
 
 namespace arbiter::wire {
 
@@ -53,19 +54,6 @@ struct LoadedModelStatus {
   bool as_loaded = false;
   std::vector<std::string> files;
   std::optional<std::string> application;
-};
-
-struct PastModelStatus {
-  std::uint64_t generation = 0;
-  std::uint64_t content = 0;  // the first generation with the same content
-  std::string name;
-  std::vector<std::string> files;
-  std::optional<std::string> application;
-  std::int64_t since_ms = 0;  // since 1970
-  std::string how;
-  std::optional<std::string> by;
-  std::optional<std::string> changes;
-  bool is_kept = false;
 };
 
 // A component of an earlier daemon that this one cannot take back.

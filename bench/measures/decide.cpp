@@ -2,7 +2,7 @@
 #include <memory>
 #include <vector>
 
-#include "bench/measures/batches.hpp"
+#include "bench/harness/batches.hpp"
 #include "bench/measures/measures.hpp"
 #include "shm/clock.hpp"
 #include "shm/decision.hpp"

@@ -3,8 +3,8 @@
 #include <memory>
 #include <vector>
 
+#include "bench/harness/batches.hpp"
 #include "bench/harness/robot.hpp"
-#include "bench/measures/batches.hpp"
 #include "bench/measures/measures.hpp"
 #include "bench/peers/systems.hpp"
 

@@ -11,8 +11,8 @@
 #include <thread>
 #include <vector>
 
+#include "bench/harness/batches.hpp"
 #include "bench/harness/robot.hpp"
-#include "bench/measures/batches.hpp"
 #include "bench/measures/measures.hpp"
 
 namespace arbiter::bench {

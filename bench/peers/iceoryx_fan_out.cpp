@@ -8,7 +8,7 @@
 #include <iceoryx_posh/popo/untyped_subscriber.hpp>
 #include <iceoryx_posh/runtime/posh_runtime.hpp>
 
-#include "bench/measures/batches.hpp"
+#include "bench/harness/batches.hpp"
 #include "bench/peers/iceoryx_roudi.hpp"
 #include "bench/peers/spin.hpp"
 #include "bench/peers/systems.hpp"

@@ -226,12 +226,13 @@ void Bridge::start(const std::vector<Part*>& opened) {
   for (Part* const part : opened) {
     if (part->incoming) {
       ins.push_back({part->gateway, *part->incoming, part->account});
-      for (const Port* port : part->entry.ports()) ins_.emplace(port->name, part->incoming.get());
+      for (const Port* port : part->entry.ports())
+        feeds_.emplace(port->name, &part->incoming->feed());
     }
     if (part->outgoing) outs.push_back({part->gateway, *part->outgoing, part->account});
     if (has_started_) say(Level::kInfo, part->entry.ports().front()->name + " is served now");
   }
-  for (const auto& out : outs) out.outgoing.lead(ins_, [this] { bell_.ring(); });
+  for (const auto& out : outs) out.outgoing.lead(feeds_, [this] { bell_.ring(); });
   if (!has_started_) {
     say(Level::kInfo, "serves " + std::to_string(ins.size()) +
                           (ins.size() == 1 ? " topic in, " : " topics in, ") +

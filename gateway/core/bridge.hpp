@@ -122,7 +122,7 @@ class Bridge {
   shm::FileDescriptor epoll_;
   std::optional<Node> node_;
   std::vector<std::unique_ptr<Part>> parts_;
-  InBySource ins_;
+  FeedBySource feeds_;
   shm::Nanoseconds open_again_ = 0;  // what is not open yet
   std::size_t open_next_ = 0;        // of parts_
   Saying waiting_;                   // for the daemon

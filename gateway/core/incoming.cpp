@@ -89,7 +89,7 @@ std::optional<Side> choose(const Choice& choice, const ForeignSample& sample) no
 }
 
 Incoming::Incoming(Node& node, const Entry& entry, Account& account, std::size_t* first)
-    : entry_(entry), account_(account) {
+    : feed_(entry), account_(account) {
   const auto ports = entry.ports();
   const std::size_t begin = first == nullptr ? 0 : *first;
   for (std::size_t tried = 0; tried < ports.size(); ++tried) {
@@ -100,21 +100,21 @@ Incoming::Incoming(Node& node, const Entry& entry, Account& account, std::size_t
 }
 
 std::optional<OutputPort<void>>& Incoming::port_of(const Port& port) noexcept {
-  const bool is_no = entry_.choice && entry_.choice->no && &port == &*entry_.choice->no;
+  const bool is_no = entry().choice && entry().choice->no && &port == &*entry().choice->no;
   return is_no ? no_ : yes_;
 }
 
 // publish() throws for another port's loan, which it never is.
 // NOLINTNEXTLINE(bugprone-exception-escape)
 Incoming::Fate Incoming::deliver(const ForeignSample& sample, Time deadline) noexcept {
-  if (!entry_.choice) return pass_on(sample, deadline);
+  if (!entry().choice) return pass_on(sample, deadline);
   // What cannot be of the entry's type has no field of it.
-  if (has_one_size(entry_) && sample.size() != entry_.type->size) {
+  if (has_one_size(entry()) && sample.size() != entry().type->size) {
     account_.too_large.add();
     deactivate_all();
     return Fate::kTooLarge;
   }
-  const auto side = choose(*entry_.choice, sample);
+  const auto side = choose(*entry().choice, sample);
   if (!side) {
     fail();
     return Fate::kUnreadable;
@@ -138,14 +138,14 @@ Incoming::Fate Incoming::deliver(const ForeignSample& sample, Time deadline) noe
 
 // As above. NOLINTNEXTLINE(bugprone-exception-escape)
 Incoming::Fate Incoming::pass_on(const ForeignSample& sample, Time deadline) noexcept {
-  Outgoing* const outgoing = outgoing_.get();
+  Outgoing* const outgoing = feed_.outgoing();
   if (outgoing == nullptr || !outgoing->begin_turn(sample.size())) {
     return pass_to(*yes_, sample, deadline);
   }
   const Fate fate = pass_to(*yes_, sample, deadline, outgoing);
   // A source that has lost would only hold up the others.
   if (!outgoing->end_turn(yes_->name(), max_age_.get())) {
-    outgoing_.withdraw();
+    feed_.withdraw();
   }
   return fate;
 }
@@ -186,7 +186,7 @@ Incoming::Fate Incoming::pass_to(OutputPort<void>& port, const ForeignSample& sa
 
 void Incoming::fail() noexcept {
   account_.unreadable.add();
-  if (entry_.choice) deactivate_all();
+  if (entry().choice) deactivate_all();
 }
 
 void Incoming::deactivate_all() noexcept {

@@ -14,7 +14,7 @@
 #include <arbiter/output_port.hpp>
 
 #include "gateway/core/account.hpp"
-#include "gateway/core/announced.hpp"
+#include "gateway/core/feed.hpp"
 #include "gateway/core/freshness.hpp"
 #include "gateway/mapping/mapping.hpp"
 
@@ -66,11 +66,6 @@ class Incoming {
   // for another port's loan, and this one is its own.
   Fate deliver(const ForeignSample& sample,  // NOLINT(bugprone-exception-escape)
                Time deadline) noexcept;
-  // What deliver() publishes is what that `out` entry sends: deliver() then sends it there itself,
-  // until nothing comes there any more. Outlives the last deliver(). The gateway's loop.
-  void follow(Outgoing& outgoing) noexcept {
-    if (!entry_.choice) outgoing_.announce(outgoing);
-  }
   // A sample came that cannot be read at all. With a choice its sources end.
   void fail() noexcept;
 
@@ -78,7 +73,8 @@ class Incoming {
   [[nodiscard]] MaxAge& max_age() noexcept { return max_age_; }
   [[nodiscard]] const MaxAge& max_age() const noexcept { return max_age_; }
 
-  [[nodiscard]] const Entry& entry() const noexcept { return entry_; }
+  [[nodiscard]] const Entry& entry() const noexcept { return feed_.entry(); }
+  [[nodiscard]] Feed& feed() noexcept { return feed_; }
   // Tells the daemon how things stand. The gateway's loop.
   void describe(std::string_view text, bool is_trouble);
 
@@ -91,13 +87,12 @@ class Incoming {
                const ForeignSample& sample, Time deadline, Outgoing* outgoing = nullptr) noexcept;
   void deactivate_all() noexcept;
 
-  const Entry& entry_;
+  Feed feed_;
   Account& account_;
   MaxAge max_age_;
   // Without a choice the first; with one, what it has of the two.
   std::optional<OutputPort<void>> yes_;
   std::optional<OutputPort<void>> no_;
-  Announced<Outgoing> outgoing_;
 };
 
 }  // namespace arbiter::gateway

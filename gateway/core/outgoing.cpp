@@ -4,7 +4,6 @@
 #include <cstring>
 #include <utility>
 
-#include "gateway/core/incoming.hpp"
 #include "shm/clock.hpp"
 
 namespace arbiter::gateway {
@@ -36,8 +35,8 @@ Outgoing::Outgoing(Node& node, const Entry& entry, Sender& sender, Account& acco
 
 Outgoing::~Outgoing() { drop_draft(); }
 
-void Outgoing::lead(const InBySource& ins, std::function<void()> call_loop) {
-  ins_ = &ins;
+void Outgoing::lead(const FeedBySource& feeds, std::function<void()> call_loop) {
+  feeds_ = &feeds;
   call_loop_ = std::move(call_loop);
 }
 
@@ -69,7 +68,7 @@ void Outgoing::send_waiting(shm::Nanoseconds now) {
       drop_draft();
       continue;
     }
-    Incoming* const in = incoming_of(sample->source());
+    Feed* const in = feed_of(sample->source());
     if (in != nullptr && !has_right_header(*in, (*sample)->size())) {
       drop_draft();
       continue;
@@ -80,15 +79,15 @@ void Outgoing::send_waiting(shm::Nanoseconds now) {
   }
 }
 
-Incoming* Outgoing::incoming_of(std::string_view source) const noexcept {
-  if (ins_ == nullptr) return nullptr;
-  const auto found = ins_->find(source);
-  return found == ins_->end() ? nullptr : found->second;
+Feed* Outgoing::feed_of(std::string_view source) const noexcept {
+  if (feeds_ == nullptr) return nullptr;
+  const auto found = feeds_->find(source);
+  return found == feeds_->end() ? nullptr : found->second;
 }
 
 // Which entries are connected only the model says, which a gateway does not read: who has not let
 // `arbiter check` compare the two learns it here. Such samples never go straight on.
-bool Outgoing::has_right_header(const Incoming& in, std::size_t size) {
+bool Outgoing::has_right_header(const Feed& in, std::size_t size) {
   if (have_one_header(in.entry(), entry_)) return true;
   account_for(Sender::Result::kUnreadable, size);
   if (std::exchange(told_, &in) != &in) {

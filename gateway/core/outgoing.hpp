@@ -25,6 +25,7 @@
 #include <arbiter/output_port.hpp>
 
 #include "gateway/core/account.hpp"
+#include "gateway/core/feed.hpp"
 #include "gateway/core/freshness.hpp"
 #include "gateway/mapping/mapping.hpp"
 #include "shm/activity.hpp"
@@ -67,9 +68,8 @@ class Sender {
   virtual void drop_draft() noexcept {}
 };
 
-class Incoming;
 // The `in` entries of a gateway by their sources, of which an entry may have two.
-using InBySource = std::map<std::string, Incoming*, std::less<>>;
+using FeedBySource = std::map<std::string, Feed*, std::less<>>;
 
 // The type with which an entry's ports are opened.
 [[nodiscard]] Type type_of(const Entry& entry);
@@ -100,7 +100,7 @@ class Outgoing {
   // A sample's age is that at which it is sent, and not at `now`: others may have waited meanwhile.
   void run(shm::Nanoseconds now);
   // Before run(): whose samples may go straight on, and what lets the loop run() all. The loop.
-  void lead(const InBySource& ins, std::function<void()> call_loop);
+  void lead(const FeedBySource& feeds, std::function<void()> call_loop);
   // Before a sample of that many bytes is published. False: somebody else has the turn, or
   // something is left for the loop, or the sample itself is; publish all the same. Never waits. Any
   // thread.
@@ -135,9 +135,9 @@ class Outgoing {
   void send_waiting(shm::Nanoseconds now);
   void send_idle(shm::Nanoseconds now);
   // The entry from which samples of that source come; null: they come from a component.
-  [[nodiscard]] Incoming* incoming_of(std::string_view source) const noexcept;
+  [[nodiscard]] Feed* feed_of(std::string_view source) const noexcept;
   // False: what comes from that entry has another header, and is counted.
-  [[nodiscard]] bool has_right_header(const Incoming& in, std::size_t size);
+  [[nodiscard]] bool has_right_header(const Feed& in, std::size_t size);
   [[nodiscard]] Sender::Result send_in_turn(const Sample<void>& sample,
                                             shm::Nanoseconds stamp) noexcept;
   void send_idle_sample() noexcept;
@@ -157,8 +157,8 @@ class Outgoing {
   std::mutex turn_;  // of the port, the sender, and all below but for the atomics
   std::atomic<bool> loop_waits_{false};  // for the turn; a hint, which nothing depends on
   InputPort<void> port_;
-  const InBySource* ins_ = nullptr;
-  const Incoming* told_ = nullptr;  // whose samples have another header, last
+  const FeedBySource* feeds_ = nullptr;
+  const Feed* told_ = nullptr;  // whose samples have another header, last
   std::function<void()> call_loop_;
   std::optional<Sample<void>> left_;  // taken by a thread that could not send it
   // Of the turn, until it is sent or dropped; or of left_, which the writer had no room for.

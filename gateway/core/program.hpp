@@ -13,10 +13,10 @@
 #include <functional>
 #include <memory>
 #include <string>
-#include <vector>
 
 #include "gateway/core/bridge.hpp"
 #include "gateway/core/middleware.hpp"
+#include "gateway/core/settings.hpp"
 #include "gateway/mapping/mapping.hpp"
 
 namespace arbiter::gateway {
@@ -31,12 +31,6 @@ struct ProgramKind {
   bool is_supervised = false;
   // What a worker that has ended may have left behind; called with its process's id.
   std::function<void(int)> clean_up = [](int) {};
-};
-
-// What the command line and the mappings say.
-struct Settings {
-  std::vector<Mapping> mappings;  // checked: no errors
-  BridgeOptions bridge;
 };
 
 // The bell rings the loop; it outlives the middleware.

@@ -9,7 +9,7 @@
 
 #include "gateway/core/bridge.hpp"
 #include "gateway/core/middleware.hpp"
-#include "gateway/core/program.hpp"
+#include "gateway/core/settings.hpp"
 #include "shm/file_descriptor.hpp"
 
 namespace arbiter::gateway {

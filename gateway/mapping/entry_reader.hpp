@@ -5,7 +5,7 @@
 #include <string>
 
 #include "gateway/mapping/mapping.hpp"
-#include "gateway/mapping/read_mapping.hpp"
+#include "gateway/mapping/read_file.hpp"
 #include "rules/model/element_reader.hpp"
 
 namespace arbiter::gateway {

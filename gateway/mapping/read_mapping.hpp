@@ -1,19 +1,14 @@
 // Reads a mapping: all problems of a file in one go, each with its place.
 #pragma once
 
-#include <cstddef>
-#include <functional>
 #include <string>
 
 #include "gateway/mapping/mapping.hpp"
+#include "gateway/mapping/read_file.hpp"
 #include "rules/text/diagnostic.hpp"
 #include "rules/text/text_file.hpp"
 
 namespace arbiter::gateway {
-
-// The bytes of a file, as rules::read_bytes().
-using ReadFile =
-    std::function<std::string(const std::string& path, std::size_t limit, rules::Accept accept)>;
 
 // The result is to be used only if no error was reported. With `directory`, files that the mapping
 // names (idle="file:…") are read from there; without it, they are not looked at.

@@ -8,7 +8,7 @@
 #include <cstddef>
 #include <memory>
 
-#include "service/ports/ports.hpp"
+#include "service/ports/port_bell.hpp"
 #include "shm/file_descriptor.hpp"
 #include "wire/messages.hpp"
 

@@ -7,7 +7,6 @@
 #include <system_error>
 
 #include "service/ports/foreign_parts.hpp"
-#include "shm/bell.hpp"
 #include "shm/foreign.hpp"
 #include "shm/utf8.hpp"
 #include "wire/errands.hpp"
@@ -25,18 +24,6 @@ shm::TypeInfo fine_type(const wire::Message& open) {
 }
 
 }  // namespace
-
-PortBell::~PortBell() {
-  wire::Errands::of_the_process().close(user_, shm::FileDescriptor(pipe_.release()));
-}
-
-void PortBell::ring() const {
-  if (pending_.ask()) return;
-  wire::Errands::of_the_process().run(user_, [self = shared_from_this()] {
-    self->pending_.begin();
-    shm::ring_bell(self->pipe_.get());
-  });
-}
 
 // The last who closes a segment frees its memory, which takes its time.
 OutputPort::~OutputPort() { wire::Errands::of_the_process().close(user, std::move(segment)); }
@@ -76,6 +63,16 @@ std::unique_ptr<InputPort> adopt_input(const wire::Received& open, uid_t user) {
   port->user = user;
   port->type = fine_type(open.message);
   return port;
+}
+
+wire::Message message_to(wire::MessageKind kind, shm::PortInstance port, shm::PortInstance peer,
+                         std::uint32_t id) {
+  wire::Message message;
+  message.kind = kind;
+  message.port = port;
+  message.peer = peer;
+  message.id = id;
+  return message;
 }
 
 }  // namespace arbiter::service

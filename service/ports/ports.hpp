@@ -10,7 +10,7 @@
 #include <utility>
 
 #include "service/clients/client.hpp"
-#include "service/ports/pending_ring.hpp"
+#include "service/ports/port_bell.hpp"
 #include "service/ports/port_names.hpp"
 #include "shm/input_segment.hpp"
 #include "shm/output_segment.hpp"
@@ -25,26 +25,6 @@ struct Claim {
   Charge charge{};  // of the user whose component says so
 };
 using Claims = std::map<shm::PortInstance, Claim>;
-
-// The write end of an input port's bell, as its component has handed it in and as it is passed on.
-// The pipe's lock may be held by any process that has it, so ringing and closing are errands of the
-// component's user.
-class PortBell : public std::enable_shared_from_this<PortBell> {
- public:
-  PortBell(shm::FileDescriptor pipe, uid_t user) : pipe_(std::move(pipe)), user_(user) {}
-  PortBell(const PortBell&) = delete;
-  PortBell& operator=(const PortBell&) = delete;
-  ~PortBell();
-
-  // Soon. Rings that are asked for meanwhile are this one.
-  void ring() const;
-  [[nodiscard]] int descriptor() const { return pipe_.get(); }
-
- private:
-  shm::FileDescriptor pipe_;
-  const uid_t user_;
-  mutable PendingRing pending_;
-};
 
 // Descriptors that the daemon keeps of a port.
 inline constexpr std::uint64_t kDescriptorsOfOutput = 1;
@@ -128,5 +108,9 @@ struct Link {
     return kind == LinkKind::kConnected && !mismatch.empty();
   }
 };
+
+// What `port` is to know of `peer`.
+wire::Message message_to(wire::MessageKind kind, shm::PortInstance port, shm::PortInstance peer,
+                         std::uint32_t id = 0);
 
 }  // namespace arbiter::service

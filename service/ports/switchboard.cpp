@@ -14,16 +14,6 @@ Owner owner(const Client& client, shm::PortInstance port) {
 
 }  // namespace
 
-wire::Message message_to(wire::MessageKind kind, shm::PortInstance port, shm::PortInstance peer,
-                         std::uint32_t id) {
-  wire::Message message;
-  message.kind = kind;
-  message.port = port;
-  message.peer = peer;
-  message.id = id;
-  return message;
-}
-
 OutputPort& Switchboard::add(std::unique_ptr<OutputPort> port, Client& client, Source& source) {
   port->instance = registry_.next_instance();
   OutputPort& added = *port;

@@ -20,10 +20,6 @@
 
 namespace arbiter::service {
 
-// What `port` is to know of `peer`.
-wire::Message message_to(wire::MessageKind kind, shm::PortInstance port, shm::PortInstance peer,
-                         std::uint32_t id = 0);
-
 class Switchboard {
  public:
   Switchboard(PortNames& names, Registry& registry)

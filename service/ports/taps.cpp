@@ -4,7 +4,6 @@
 #include <utility>
 
 #include "service/ports/foreign_parts.hpp"
-#include "service/ports/switchboard.hpp"
 #include "shm/event_segment.hpp"
 #include "shm/tap_segment.hpp"
 #include "wire/errands.hpp"

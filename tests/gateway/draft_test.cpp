@@ -31,8 +31,8 @@ std::string large(char name) {
 class Drafts : public testing::Test {
  protected:
   Drafts() {
-    ins_.emplace("/Nav/cmd:o", &nav_);
-    outgoing_.lead(ins_, [] {});
+    feeds_.emplace("/Nav/cmd:o", &nav_.feed());
+    outgoing_.lead(feeds_, [] {});
     sender_.drafts = true;
     outgoing_.run(shm::monotonic_now());
     deliver("first");
@@ -60,7 +60,7 @@ class Drafts : public testing::Test {
   Account account_{"cmd", "subscriber"};
   KeepingSender sender_;
   OneAge ages_;
-  InBySource ins_;
+  FeedBySource feeds_;
   Node node_{"gateway"};
   Incoming nav_{node_, read_.entry(0), nav_account_};
   Outgoing outgoing_{node_, read_.entry(1), sender_, account_, ages_};
@@ -194,8 +194,8 @@ TEST_F(Drafts, NorIsOneOfItsPredecessorThatHasItsNumber) {
     predecessor.deliver(BytesSample(large('a')), Time::max());
   }
   Incoming successor(node_, stop.entry(), nav_account_);
-  ins_.emplace("/Stop/cmd:o", &successor);
-  successor.follow(outgoing_);
+  feeds_.emplace("/Stop/cmd:o", &successor.feed());
+  successor.feed().follow(outgoing_);
   successor.deliver(BytesSample(large('b')), Time::max());
   EXPECT_THAT(sender_.sent, ElementsAre(large('a'), large('b')));
   EXPECT_EQ(sender_.sent_drafts, 1);

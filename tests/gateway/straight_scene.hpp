@@ -36,9 +36,9 @@ class Straight : public testing::Test {
                        "<in topic='/teleop' type='a/msg/B' port='/Teleop/cmd:o' max_size='64'/>"
                        "<out port='/Base/cmd:i' topic='/cmd' type='a/msg/B' " +
                        idle + "/>")) {
-    ins_.emplace("/Nav/cmd:o", &nav_);
-    ins_.emplace("/Teleop/cmd:o", &teleop_);
-    outgoing_.lead(ins_, [this] { ++calls_; });
+    feeds_.emplace("/Nav/cmd:o", &nav_.feed());
+    feeds_.emplace("/Teleop/cmd:o", &teleop_.feed());
+    outgoing_.lead(feeds_, [this] { ++calls_; });
     outgoing_.run(shm::monotonic_now());
   }
 
@@ -74,7 +74,7 @@ class Straight : public testing::Test {
   Account account_{"cmd", "subscriber"};
   KeepingSender sender_;
   OneAge ages_;
-  InBySource ins_;
+  FeedBySource feeds_;
   int calls_ = 0;
   Node node_{"gateway"};
   Incoming nav_{node_, read_.entry(0), nav_account_};

@@ -155,8 +155,8 @@ TEST_F(Straight, ASampleCostsNoAllocation) {
 class OtherHeaders : public testing::Test {
  protected:
   OtherHeaders() {
-    for (const Port* port : in_.entry().ports()) ins_.emplace(port->name, &in_);
-    outgoing_.lead(ins_, [] {});
+    for (const Port* port : in_.entry().ports()) feeds_.emplace(port->name, &in_.feed());
+    outgoing_.lead(feeds_, [] {});
   }
   Incoming::Fate deliver(const std::string& bytes) {
     return in_.deliver(BytesSample(bytes, 8), Time::max());
@@ -174,7 +174,7 @@ class OtherHeaders : public testing::Test {
   Account account_{"cmd", "subscriber"};
   KeepingSender sender_;
   OneAge ages_;
-  InBySource ins_;
+  FeedBySource feeds_;
   Node node_{"gateway"};
   Incoming in_{node_, read_.entry(0), in_account_};
   Outgoing outgoing_{node_, read_.entry(1), sender_, account_, ages_};
@@ -201,7 +201,7 @@ TEST_F(OtherHeaders, WhatBeginsWithAnotherHeaderIsNotSent) {
 TEST_F(Straight, ThreadsTakeTurns) {
   constexpr int kSamples = 5000;
   std::atomic<bool> ends = false;
-  outgoing_.lead(ins_, [] {});
+  outgoing_.lead(feeds_, [] {});
   std::thread loop([&] {
     while (!ends) {
       run();
