@@ -75,9 +75,10 @@ std::shared_ptr<watch::Instance> watch_instance(const std::string& verb,
 }
 
 std::shared_ptr<watch::Instance> follow_instance(const std::string& verb,
-                                                 const std::string& instance) {
+                                                 const std::string& instance,
+                                                 std::chrono::milliseconds most) {
   wire::Caller follower = caller(verb, instance);
-  follower.answer_time = std::chrono::milliseconds(1000);
+  follower.answer_time = most;
   return std::make_shared<watch::Instance>(std::move(follower));
 }
 

@@ -4,6 +4,7 @@
 // knows that an activity ends, in memory. The daemon is asked once for each model that comes into
 // force, for its names.
 #include <algorithm>
+#include <chrono>
 #include <cstdint>
 #include <exception>
 #include <iostream>
@@ -51,6 +52,15 @@ shm::Nanoseconds end_of(const WaitOptions& options, shm::Nanoseconds started) {
   return time_after(started, options.timeout.value_or(shm::kForever));
 }
 
+// How long the daemon has for an answer: not beyond the end, but for as long as one is looked for,
+// lest a short time be over before one that is busy has let us in.
+std::chrono::milliseconds time_to_answer(const WaitOptions& options, shm::Nanoseconds deadline) {
+  if (!options.timeout || *options.timeout == 0) return kMostHeldUp;
+  const std::chrono::nanoseconds left(deadline - shm::monotonic_now());
+  return std::clamp(std::chrono::ceil<std::chrono::milliseconds>(left), kConnectTimeout,
+                    kMostHeldUp);
+}
+
 // The instance; with --timeout, one whose daemon comes in time. Null: interrupted meanwhile.
 std::shared_ptr<watch::Instance> find_instance(const WaitOptions& options,
                                                shm::Nanoseconds deadline,
@@ -58,7 +68,7 @@ std::shared_ptr<watch::Instance> find_instance(const WaitOptions& options,
   constexpr shm::Nanoseconds kLookAgain = 50'000'000;
   for (bool has_said = false;;) {
     try {
-      return follow_instance("wait", options.instance);
+      return follow_instance("wait", options.instance, time_to_answer(options, deadline));
     } catch (const wire::RefusedError&) {
       throw;
     } catch (const wire::CallError& error) {

@@ -38,7 +38,7 @@ void DecisionMemory::make_tables_resident() const {
 }
 
 void DecisionMemory::add_page(SourceId id, PageNumber number, std::string name,
-                              FileDescriptor page) {
+                              FileDescriptor&& page) {
   if (id >= kMaxSources) throw std::runtime_error("the daemon names a source beyond its limit");
   if (checked_size(page, Seals::kFixedSize) != sizeof(ActivityPage)) {
     throw std::runtime_error("an activity page has another size");

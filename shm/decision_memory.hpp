@@ -33,8 +33,9 @@ class DecisionMemory {
   // tables, the next one among them. Throws std::system_error.
   void make_tables_resident() const;
   // The source's page of that number, in force or to come. A page that cannot be locked is used
-  // nevertheless: std::system_error is thrown once it is.
-  void add_page(SourceId id, PageNumber number, std::string name, FileDescriptor page);
+  // nevertheless: std::system_error is thrown once it is. One that cannot be mapped stays the
+  // caller's.
+  void add_page(SourceId id, PageNumber number, std::string name, FileDescriptor&& page);
   // Wait-free. The string stays as it is for as long as this lives; a watcher's until its id has
   // been given to two more names.
   [[nodiscard]] const std::string& source_name(SourceId id) const noexcept;

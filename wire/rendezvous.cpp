@@ -102,8 +102,8 @@ Address address_of(const std::string& directory, const std::string& file) {
   return result;
 }
 
-shm::FileDescriptor make_socket() {
-  shm::FileDescriptor made(socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0));
+shm::FileDescriptor make_socket(int mode = 0) {
+  shm::FileDescriptor made(socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC | mode, 0));
   if (!made) fail("cannot make a socket");
   // A daemon that is stopped holds nobody up for longer than this, be it in connect() or sendmsg().
   const timeval limit{kMaxWaitToSend, 0};
@@ -169,7 +169,7 @@ void pass_over(const std::string& directory, const std::string& file, const char
 
 // Who listens at that file of the directory, if it is trusted. `who`: "daemon", "link".
 std::optional<shm::FileDescriptor> connect_in(const std::string& directory, const std::string& file,
-                                              const char* who, std::string& why_not) {
+                                              const char* who, std::string& why_not, int mode = 0) {
   // Not even connected to: who listens there could let nobody in, for a second each time.
   if (const auto stranger = stranger_who_owns(directory)) {
     char why[112];
@@ -180,7 +180,7 @@ std::optional<shm::FileDescriptor> connect_in(const std::string& directory, cons
     pass_over(directory, file, why, why_not);
     return {};
   }
-  shm::FileDescriptor socket = make_socket();
+  shm::FileDescriptor socket = make_socket(mode);
   const Address at = address_of(directory, file);
   const auto* address = reinterpret_cast<const sockaddr*>(&at.address);
   if (connect(socket.get(), address, sizeof at.address) != 0) {
@@ -321,10 +321,11 @@ Listener listen_as_link(const std::string& directory, const std::string& instanc
 }
 
 std::optional<shm::FileDescriptor> connect_to_daemon(const std::string& instance,
-                                                     std::string& why_not, std::string* found_in) {
+                                                     std::string& why_not, std::string* found_in,
+                                                     int mode) {
   why_not.clear();
   const auto try_in = [&](const std::string& directory) {
-    auto socket = connect_in(directory, instance + kSocketEnding, "daemon", why_not);
+    auto socket = connect_in(directory, instance + kSocketEnding, "daemon", why_not, mode);
     if (socket && found_in != nullptr) *found_in = directory;
     return socket;
   };

@@ -45,10 +45,12 @@ Listener listen_as_link(const std::string& directory, const std::string& instanc
 // runs as root, as the user `arbiter`, as this user, or, in /run/arbiter, as the user to whom root
 // has given that directory. Where there is none, `why_not` lists the sockets that were tried, each
 // with what was wrong.
-// `directory`, where it is given: the one in which it was found.
+// `directory`, where it is given: the one in which it was found. `mode`: SOCK_NONBLOCK for a socket
+// that does not block, not even here where too many wait to be let in; else that takes a second.
 std::optional<shm::FileDescriptor> connect_to_daemon(const std::string& instance,
                                                      std::string& why_not,
-                                                     std::string* directory = nullptr);
+                                                     std::string* directory = nullptr,
+                                                     int mode = 0);
 
 // Likewise to the instance's link, which is trusted as a daemon is; in /run/arbiter-link, as the
 // user to whom root has given that.

@@ -22,13 +22,13 @@ constexpr const char* kMismatch = "mismatch";
 constexpr std::array<State, 9> kStates{
     {{"connected", End::kOpen, End::kOpen},
      {"input port away", End::kOpen, End::kAway},
-     {"input port closed", End::kOpen, End::kClosed},
+     {"input port not open", End::kOpen, End::kClosed},
      {"output port away", End::kAway, End::kOpen},
-     {"output port closed", End::kClosed, End::kOpen},
+     {"output port not open", End::kClosed, End::kOpen},
      {"both ends away", End::kAway, End::kAway},
-     {"both ends closed", End::kClosed, End::kClosed},
-     {"output port closed, input port away", End::kClosed, End::kAway},
-     {"output port away, input port closed", End::kAway, End::kClosed}}};
+     {"neither end open", End::kClosed, End::kClosed},
+     {"output port not open, input port away", End::kClosed, End::kAway},
+     {"output port away, input port not open", End::kAway, End::kClosed}}};
 
 constexpr std::array<const char*, 2> kWhenFull{"drop_oldest", "refuse_new"};
 

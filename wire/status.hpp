@@ -140,7 +140,7 @@ struct ConnectionStatus {
   [[nodiscard]] bool is_connected() const {
     return output == End::kOpen && input == End::kOpen && !mismatch;
   }
-  // "connected", "mismatch", "input port closed", …
+  // "connected", "mismatch", "input port not open", …
   [[nodiscard]] std::string state() const;
 };
 

@@ -46,7 +46,7 @@ void NodeCore::say_descriptions() noexcept {
     description.said_at = now;
     // What follows may say something else: it does not wait in the outbox.
     description.is_said =
-        outbox_.empty() && wire::send_message(socket_->get(), message) == wire::SendResult::kSent;
+        has_said_all() && wire::send_message(socket_->get(), message) == wire::SendResult::kSent;
   }
 }
 

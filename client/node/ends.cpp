@@ -38,7 +38,7 @@ bool has_hung_up(const shm::FileDescriptor& socket) {
 }  // namespace
 
 bool NodeCore::is_heard() const noexcept {
-  if (standing_ != Standing::kMember || socket_ == nullptr || !outbox_.empty()) return false;
+  if (standing_ != Standing::kMember || socket_ == nullptr || !has_said_all()) return false;
   int unread = 0;  // bytes
   return !has_hung_up(*socket_) && ::ioctl(socket_->get(), SIOCOUTQ, &unread) == 0 && unread == 0;
 }
@@ -77,6 +77,7 @@ void NodeCore::say_ended(std::uint64_t node) noexcept {
 void NodeCore::say_the_end() noexcept {
   if (!process_.is_here() || node_ == 0) return;
   if (standing_ == Standing::kMember && socket_ != nullptr) {
+    due_.clear();
     outbox_.clear();
     say_ended(node_);
     const auto begin = Clock::now();

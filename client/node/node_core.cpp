@@ -154,11 +154,6 @@ void NodeCore::say_that_we_wait(const std::string& whom, milliseconds most) cons
   }
 }
 
-NodeCore::Socket NodeCore::socket() {
-  const std::lock_guard lock(mutex_);
-  return socket_;
-}
-
 std::shared_ptr<SharedMemory> NodeCore::memory() {
   const std::lock_guard lock(mutex_);
   return memory_;
@@ -204,10 +199,10 @@ bool NodeCore::wait_for_news(std::unique_lock<std::mutex>& lock, Clock::time_poi
 // Nobody waits for the answer any more.
 void NodeCore::give_up_on(std::uint64_t request) {
   const auto unanswered = replies_.extract(request);
-  if (unanswered.mapped().asked_in == conversation_ && socket_ != nullptr) {
+  if (unanswered.mapped().asked_in == conversation_ && standing_ == Standing::kMember) {
     const std::string& opens = unanswered.mapped().opens;
     if (!outbox_.withdraw(request) && !opens.empty()) given_up_.emplace(request, opens);
-    if (outbox_.empty()) heed_room(false);
+    heed();
   }
   if (unanswered.mapped().opened != 0) forget_port(unanswered.mapped().opened);
 }

@@ -8,7 +8,9 @@
 //   say.cpp           what the node says
 //   ends.cpp          that it has ended, and others of its process (ended_nodes.hpp)
 //   rejoin.cpp        losing the daemon, and coming back to another
+//   hand_back.cpp     what that one is handed back
 //   descriptions.cpp  what components say of their ports
+//   pages.cpp         what it sees of the activity of sources
 //   taps.cpp          taps that this node opens, and taps of its output ports
 //
 // Thread safety: opening and closing ports may come from any thread; what the daemon says is
@@ -19,6 +21,8 @@
 
 #include <chrono>
 #include <condition_variable>
+#include <cstdint>
+#include <deque>
 #include <exception>
 #include <functional>
 #include <map>
@@ -43,8 +47,6 @@
 #include "wire/messages.hpp"
 
 namespace arbiter::detail {
-
-struct PortAtHand;
 
 class NodeCore : public std::enable_shared_from_this<NodeCore> {
  public:
@@ -104,6 +106,10 @@ class NodeCore : public std::enable_shared_from_this<NodeCore> {
   struct ThrownByCallback {
     std::exception_ptr thrown;
   };
+  struct MissedPage {
+    std::string source;
+    shm::FileDescriptor page;
+  };
   // kRejoining: a daemon has been handed back everything, and has not answered yet.
   enum class Standing : std::uint8_t { kMember, kRejoining, kAlone };
 
@@ -158,8 +164,10 @@ class NodeCore : public std::enable_shared_from_this<NodeCore> {
   void handle_refusal(const wire::Message& refusal);
   void handle_unmentioned(const wire::Message& message);
   void handle_yield(const wire::Message& message);
+  // Activity pages, and tables (pages.cpp).
   void add_page(wire::Received& received);
-  void miss_page(const std::string& source, const std::string& why);
+  void note_missed(const std::string& source, const std::string& why);
+  void try_missed_pages();
   void make_tables_resident();
   void hear_of_growth(const wire::Message& message);
   void look_at_growth(shm::PortInstance port, const OutputPeer& peer);
@@ -177,18 +185,31 @@ class NodeCore : public std::enable_shared_from_this<NodeCore> {
   // Under no lock. False: there was none.
   bool give_notices();
   void give(const Notice& notice) const noexcept;
-  [[nodiscard]] bool has_notices();
+  // Under mutex_.
+  [[nodiscard]] bool has_notices() const noexcept { return !notices_.empty() && !is_giving_; }
 
-  [[nodiscard]] bool watch_socket() const;
+  [[nodiscard]] bool watch_socket();
   void hang_up() const noexcept;
   // Under mutex_: the conversation is over.
   void lose_daemon() noexcept;
   void be_alone(Clock::duration look_again_in) noexcept;
   void ring_timer_every(Clock::duration time) const;
   void rejoin();
-  [[nodiscard]] bool hand_back_memory(const shm::FileDescriptor& socket, bool has_ports) const;
-  [[nodiscard]] bool hand_back(const shm::FileDescriptor& socket,
-                               const std::vector<PortAtHand>& ports) const;
+  // Why this daemon is left alone for a second.
+  void put_off(const std::string& why);
+  // What is handed back, and taps (hand_back.cpp). Under mutex_.
+  struct Due {
+    wire::MessageKind kind;
+    shm::PortInstance port = 0;  // or the tap
+    std::uint64_t about = 0;     // of a link: the peer; of a page: the source
+    std::uint64_t number = 0;    // of the link, of the page; of a tap: the request
+    int descriptor = -1;         // of the page, which the memory owns
+  };
+  void begin_to_hand_back();
+  // False: it is not there any more.
+  [[nodiscard]] bool put_into_words(const Due& due, wire::Message& message,
+                                    Outbox::Descriptors& descriptors) const noexcept;
+  void say_what_is_due() noexcept;
   void be_welcomed(wire::Received& welcome);
   void be_turned_away(const wire::Message& refusal);
   // Whether the daemon is there, and has read all that we have said.
@@ -198,15 +219,24 @@ class NodeCore : public std::enable_shared_from_this<NodeCore> {
   void say_who_has_ended(Whom whom) noexcept;
   void say_ended(std::uint64_t node) noexcept;
 
-  [[nodiscard]] Socket socket();
   // Under mutex_. Never waits for the daemon. What is lost with the conversation, rejoining makes
   // good; it is over after this where that is the only way on.
   void say(const wire::Message& message, Outbox::Descriptors descriptors = {-1, -1}) noexcept;
   void say_what_waits() noexcept;
   // The last that it says, under no lock: there is no other thread.
   void say_the_end() noexcept;
-  // Whether the loop is to hear of room in the socket, too.
-  void heed_room(bool is_wanted) const noexcept;
+  [[nodiscard]] bool has_said_all() const noexcept { return due_.empty() && outbox_.empty(); }
+  // Until the user's descriptors that are under way have been read: there is room for no more.
+  [[nodiscard]] bool has_too_many() const noexcept {
+    return due_has_too_many_ || outbox_.has_too_many();
+  }
+  [[nodiscard]] bool hands_back() const noexcept {
+    return standing_ == Standing::kRejoining && !due_.empty();
+  }
+  // Whether it is time for what the daemon says.
+  [[nodiscard]] bool hears() const noexcept;
+  // Has the loop hear of what it is time for: news of the daemon, room in the socket.
+  void heed() noexcept;
   void say_closed(shm::PortInstance port) noexcept;
   void forget_port(shm::PortInstance port);
   // `memory`: that which the question is about, if any. Throws Error, MemoryIsNew.
@@ -237,7 +267,10 @@ class NodeCore : public std::enable_shared_from_this<NodeCore> {
   std::condition_variable news_;  // an answer, or a change of standing
   std::mutex pump_mutex_;         // without a service thread: one caller at a time
   Socket socket_;                 // null while alone
-  Outbox outbox_;                 // of the conversation
+  std::uint32_t heeded_ = 0;      // what the loop hears of it
+  std::deque<Due> due_;           // said before all in the outbox
+  bool due_has_too_many_ = false;
+  Outbox outbox_;                       // of the conversation
   std::set<std::uint64_t> ended_said_;  // nodes of this process, and perhaps not heard yet
   std::uint64_t ended_said_in_ = 0;     // the conversation
   bool has_ended_to_tell_ = false;
@@ -245,6 +278,9 @@ class NodeCore : public std::enable_shared_from_this<NodeCore> {
   std::uint64_t conversation_ = 1;  // counts the daemons that have welcomed us
   std::uint64_t node_ = 0;          // our number among all nodes
   std::string turned_away_;         // why the last daemon did not take us back
+  // Of the thread that pumps: they could not be mapped, and are tried again. By source and number.
+  std::map<std::pair<shm::SourceId, shm::PageNumber>, MissedPage> missed_pages_;
+  shm::Nanoseconds try_pages_at_ = 0;
   bool has_no_ports_ = false;       // rejoining without any: other memory will do as well
   shm::Nanoseconds asked_ = 0;      // when we asked to rejoin
   bool has_told_of_clock_ = false;  // that the daemon's is another

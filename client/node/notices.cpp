@@ -33,11 +33,6 @@ void NodeCore::note(NoticeKind kind, shm::PortInstance port, const std::string& 
   if (texts.insert(text).second) notices_.push_back({kind, name_of_port(port), peer, text});
 }
 
-bool NodeCore::has_notices() {
-  const std::lock_guard lock(mutex_);
-  return !notices_.empty() && !is_giving_;
-}
-
 bool NodeCore::give_notices() {
   std::unique_lock lock(mutex_);
   if (notices_.empty() || is_giving_) return false;

@@ -19,12 +19,13 @@ bool Outbox::send(int socket, const wire::Message& message, Descriptors descript
     case wire::SendResult::kSent:
     case wire::SendResult::kClosed:
       return true;
-    case wire::SendResult::kFull:
-      return keep(message, descriptors);
     case wire::SendResult::kTooMany:
+      has_too_many_ = true;
+      break;
+    case wire::SendResult::kFull:
       break;
   }
-  return false;
+  return keep(message, descriptors);
 }
 
 bool Outbox::keep(const wire::Message& message, Descriptors descriptors) noexcept try {
@@ -49,7 +50,8 @@ bool Outbox::withdraw(std::uint64_t request) noexcept {
          }) != 0;
 }
 
-bool Outbox::flush(int socket) noexcept {
+void Outbox::flush(int socket) noexcept {
+  has_too_many_ = false;
   while (!waiting_.empty()) {
     const Waiting& next = waiting_.front();
     Descriptors descriptors{};
@@ -60,16 +62,16 @@ bool Outbox::flush(int socket) noexcept {
       case wire::SendResult::kSent:
         waiting_.pop_front();
         break;
+      case wire::SendResult::kTooMany:
+        has_too_many_ = true;
+        return;
       case wire::SendResult::kFull:
-        return true;
+        return;
       case wire::SendResult::kClosed:
         waiting_.clear();
-        return true;
-      case wire::SendResult::kTooMany:
-        return false;
+        return;
     }
   }
-  return true;
 }
 
 }  // namespace arbiter::detail

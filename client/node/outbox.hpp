@@ -18,21 +18,30 @@ class Outbox {
  public:
   using Descriptors = std::array<int, wire::kMaxDescriptors>;
 
-  // Sends it to a socket that does not block, or keeps it, with copies of the descriptors. False:
-  // nothing can be said any more, and the conversation is to be begun anew: too much waits, or
-  // there is no descriptor for a copy, or the user has too many under way. Where the daemon has
-  // hung up what is said is lost with the conversation.
+  // Sends it to a socket that does not block, or keeps it. False: as of keep(). Where the daemon
+  // has hung up what is said is lost with the conversation.
   [[nodiscard]] bool send(int socket, const wire::Message& message,
                           Descriptors descriptors = {-1, -1}) noexcept;
-  // What there is room for by now. As send().
-  [[nodiscard]] bool flush(int socket) noexcept;
+  // For later, with copies of the descriptors. False: nothing can be said any more, and the
+  // conversation is to be begun anew: too much waits, or there is no descriptor for a copy.
+  [[nodiscard]] bool keep(const wire::Message& message,
+                          Descriptors descriptors = {-1, -1}) noexcept;
+  // What there is room for by now.
+  void flush(int socket) noexcept;
 
   // Nobody waits for the answer any more. False: it has been sent.
   bool withdraw(std::uint64_t request) noexcept;
 
   [[nodiscard]] bool empty() const noexcept { return waiting_.empty(); }
+  // Whoever answers what he hears had better hear no more for now.
+  [[nodiscard]] bool is_half_full() const noexcept { return waiting_.size() >= kMostWaiting / 2; }
+  // The user had too many descriptors under way at the last flush: room in the socket is no news.
+  [[nodiscard]] bool has_too_many() const noexcept { return has_too_many_; }
   // With the conversation.
-  void clear() noexcept { waiting_.clear(); }
+  void clear() noexcept {
+    waiting_.clear();
+    has_too_many_ = false;
+  }
 
  private:
   // 7 MB. To begin anew costs less than more.
@@ -43,9 +52,8 @@ class Outbox {
     std::array<shm::FileDescriptor, wire::kMaxDescriptors> descriptors;
   };
 
-  [[nodiscard]] bool keep(const wire::Message& message, Descriptors descriptors) noexcept;
-
   std::deque<Waiting> waiting_;
+  bool has_too_many_ = false;
 };
 
 // Its calls return at once from now on.

@@ -4,6 +4,7 @@
 // is handed back the memory that the last one made, and told of each port and its links
 // (service/takeover/takeover.hpp).
 #include <sys/epoll.h>
+#include <sys/socket.h>
 #include <sys/timerfd.h>
 
 #include <optional>
@@ -19,14 +20,6 @@
 
 namespace arbiter::detail {
 
-// A port as it is handed back.
-struct PortAtHand {
-  wire::Message message;
-  shm::FileDescriptor first;
-  shm::FileDescriptor second;
-  std::vector<HeldLink> links;
-};
-
 namespace {
 
 // How often a daemon is looked for.
@@ -38,45 +31,11 @@ constexpr std::chrono::milliseconds kTurnedAwayInterval{1000};
 // One comes each second.
 constexpr int kToldRefusal = 3;
 
-bool is_sent(const shm::FileDescriptor& socket, const wire::Message& message,
-             std::array<int, wire::kMaxDescriptors> descriptors = {-1, -1}) {
-  return wire::send_message(socket.get(), message, descriptors) == wire::SendResult::kSent;
-}
-
-// With descriptors of our own, for the port may be closed while it is on its way.
-template <class Core>
-PortAtHand port_at_hand(wire::MessageKind kind, const Core& core, std::uint32_t id,
-                        const shm::FileDescriptor& second) {
-  PortAtHand port;
-  port.message.kind = kind;
-  port.message.port = core.instance();
-  port.message.id = id;
-  port.message.type = core.type();
-  port.message.set_name(core.name());
-  port.first = shm::duplicate(core.segment_descriptor().get());
-  port.second = shm::duplicate(second.get());
-  port.links = core.held_links();
-  return port;
-}
-
-bool is_handed_back(const shm::FileDescriptor& socket, const PortAtHand& port) {
-  if (!is_sent(socket, port.message, {port.first.get(), port.second.get()})) return false;
-  for (const HeldLink& link : port.links) {
-    wire::Message message;
-    message.kind = wire::MessageKind::kHandBackLink;
-    message.port = port.message.port;
-    message.peer = link.peer;
-    message.link = link.number;
-    if (!is_sent(socket, message)) return false;
-  }
-  return true;
-}
-
 }  // namespace
 
-bool NodeCore::watch_socket() const {
+bool NodeCore::watch_socket() {
   epoll_event event{};
-  event.events = EPOLLIN;
+  event.events = heeded_ = EPOLLIN;
   return epoll_ctl(epoll_.get(), EPOLL_CTL_ADD, socket_->get(), &event) == 0;
 }
 
@@ -94,6 +53,8 @@ void NodeCore::be_alone(Clock::duration look_again_in) noexcept {
   if (socket_ != nullptr) epoll_ctl(epoll_.get(), EPOLL_CTL_DEL, socket_->get(), nullptr);
   hang_up();
   socket_ = nullptr;
+  due_.clear();
+  due_has_too_many_ = false;
   outbox_.clear();
   given_up_.clear();
   standing_ = Standing::kAlone;
@@ -101,102 +62,37 @@ void NodeCore::be_alone(Clock::duration look_again_in) noexcept {
   news_.notify_all();
 }
 
-// The daemon takes the page for shown: it shows it again to a node that comes back. The notice is
-// of no port in particular: whose rules read the source says so when it is missed.
-void NodeCore::miss_page(const std::string& source, const std::string& why) {
-  const std::lock_guard lock(mutex_);
-  note(NoticeKind::blind, 0, source, "the activity of " + source + " cannot be seen: " + why);
-  be_alone(kTurnedAwayInterval);
-}
-
 void NodeCore::rejoin() {
   std::string why_not;
   std::optional<shm::FileDescriptor> found;
   try {
-    found = wire::connect_to_daemon(instance_, why_not);
+    found = wire::connect_to_daemon(instance_, why_not, nullptr, SOCK_NONBLOCK);
   } catch (const std::exception&) {  // no descriptors are left: another time
   }
   if (!found) return;
-  const auto socket = std::make_shared<const shm::FileDescriptor>(std::move(*found));
-  std::vector<PortAtHand> ports;
-  {
-    const std::lock_guard lock(mutex_);
-    for (const auto& [instance, core] : outputs_) {
-      ports.push_back(port_at_hand(wire::MessageKind::kHandBackOutput, *core, core->source(),
-                                   core->page_descriptor()));
-      if (core->yields()) ports.back().message.flags = wire::kYields;
-    }
-    for (const auto& [instance, core] : inputs_) {
-      core->set_measured(false);  // unless the next daemon says so
-      ports.push_back(port_at_hand(wire::MessageKind::kHandBackInput, *core, core->port(),
-                                   core->bell().for_publishers()));
-    }
-  }
-  // What is handed back without its memory is lost: the daemon would give its name to another. So
-  // it is kept for us, as for one that is stopped, until we come another time.
-  const bool are_whole = std::all_of(
-      ports.begin(), ports.end(), [](const PortAtHand& port) { return port.first && port.second; });
-  if (!are_whole) {
-    static_cast<void>(hand_back_memory(*socket, true));
-    const std::lock_guard lock(mutex_);
-    turned_away_ = wire::no_descriptor_left("its ports");
-    ring_timer_every(kTurnedAwayInterval);
-    return;
-  }
-  // Who has no ports left may be the last that has the memory, and with it what is active, and
-  // which model is in force.
-  has_no_ports_ = ports.empty();  // as asked_, of the thread that pumps alone
-  asked_ = shm::monotonic_now();
-  if (!hand_back(*socket, ports)) return;
-  make_non_blocking(*socket);
-  shm::close_in_children(*socket);
+  shm::close_in_children(*found);
   const std::lock_guard lock(mutex_);
-  socket_ = socket;
+  begin_to_hand_back();
+  socket_ = std::make_shared<const shm::FileDescriptor>(std::move(*found));
   if (!watch_socket()) {
     be_alone(kTurnedAwayInterval);
     return;
   }
   standing_ = Standing::kRejoining;
   ring_timer_every({});
-  for (const PortAtHand& port : ports) {
-    const shm::PortInstance instance = port.message.port;  // closed meanwhile?
-    if (outputs_.count(instance) + inputs_.count(instance) == 0) say_closed(instance);
-  }
-}
-
-bool NodeCore::hand_back_memory(const shm::FileDescriptor& socket, bool has_ports) const {
-  wire::Message message = hello();
-  message.flags |= wire::kRejoins | (has_ports ? 0u : wire::kHasNoPorts);
-  if (!is_sent(socket, message, {memory_->board().get(), memory_->registry().get()})) return false;
-  for (const auto& page : memory_->pages_at_hand()) {
-    message = {};
-    message.kind = wire::MessageKind::kHandBackPage;
-    message.id = page.source;
-    message.value = page.number;
-    if (!is_sent(socket, message, {page.descriptor, -1})) return false;
-  }
-  return true;
-}
-
-bool NodeCore::hand_back(const shm::FileDescriptor& socket,
-                         const std::vector<PortAtHand>& ports) const {
-  if (!hand_back_memory(socket, !ports.empty())) return false;
-  for (const PortAtHand& port : ports) {
-    if (!is_handed_back(socket, port)) return false;
-  }
-  wire::Message message;
-  message.kind = wire::MessageKind::kHandedBack;
-  return is_sent(socket, message);
+  asked_ = shm::monotonic_now();
+  say_what_waits();
+  if (!options_.service_thread) ring_when_to_look_again();
 }
 
 void NodeCore::be_welcomed(wire::Received& welcome) {
   const std::lock_guard lock(mutex_);
   if (standing_ != Standing::kRejoining) return;
-  turned_away_ = wire::find_fault_in_clock(welcome.message, asked_);
-  if (!turned_away_.empty()) {
+  const std::string fault = wire::find_fault_in_clock(welcome.message, asked_);
+  if (!fault.empty()) {
     // Once, though each time it is measured a little otherwise.
-    if (!std::exchange(has_told_of_clock_, true)) note(NoticeKind::apart, 0, {}, turned_away_);
-    be_alone(kTurnedAwayInterval);
+    if (!std::exchange(has_told_of_clock_, true)) note(NoticeKind::apart, 0, {}, fault);
+    put_off(fault);
     return;
   }
   has_told_of_clock_ = false;
@@ -206,10 +102,10 @@ void NodeCore::be_welcomed(wire::Received& welcome) {
       memory_ = std::make_shared<SharedMemory>(std::move(welcome.descriptors[0]),
                                                std::move(welcome.descriptors[1]), service_bell_,
                                                residence());
+      missed_pages_.clear();
       ring_for_ended(service_bell_, shm::identity_of(memory_->board()), options_.service_thread);
     } catch (const std::exception& error) {
-      turned_away_ = error.what();
-      be_alone(kTurnedAwayInterval);
+      put_off(error.what());
       return;
     }
   }
@@ -222,19 +118,25 @@ void NodeCore::be_welcomed(wire::Received& welcome) {
   for (const auto& [instance, output] : outputs_) output->doubt_taps();
   describe_again();
   reopen_taps();
+  say_what_waits();
   news_.notify_all();
+}
+
+void NodeCore::put_off(const std::string& why) {
+  turned_away_ = why;
+  be_alone(kTurnedAwayInterval);
 }
 
 // The conversation is over; but the daemon may be replaced by one that knows us. It is told once,
 // and not if a daemon merely has no descriptor to spare for a moment.
 void NodeCore::be_turned_away(const wire::Message& refusal) {
-  turned_away_ = refusal.text_view();
+  const std::string why(refusal.text_view());
   if (++refusals_ == kToldRefusal) {
     note(NoticeKind::apart, 0, {},
          "components that come now do not see \"" + name_ +
-             "\", which goes on with those that it is connected to: " + turned_away_);
+             "\", which goes on with those that it is connected to: " + why);
   }
-  be_alone(kTurnedAwayInterval);
+  put_off(why);
 }
 
 }  // namespace arbiter::detail

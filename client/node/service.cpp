@@ -24,6 +24,8 @@ constexpr int kServiceNiceness = 5;
 // successor have pushed them out. The successor rings nobody for that. The same for taps that no
 // daemon knows: whether their programs live.
 constexpr int kTidyInterval = 1000;  // ms
+// How often it is tried to say what the user has too many descriptors under way for.
+constexpr int kSayAgainInterval = 50;  // ms
 
 }  // namespace
 
@@ -82,12 +84,12 @@ void NodeCore::run_service_thread() {
 
 int NodeCore::look_again_in() const noexcept {
   const bool has_to_tidy =
-      has_ended_to_tell_ ||
+      has_ended_to_tell_ || !missed_pages_.empty() ||
       std::any_of(inputs_.begin(), inputs_.end(),
                   [](const auto& input) { return input.second->has_predecessors(); }) ||
       std::any_of(outputs_.begin(), outputs_.end(),
                   [](const auto& output) { return output.second->has_doubtful_taps(); });
-  const int tidy = has_to_tidy ? kTidyInterval : -1;
+  const int tidy = has_too_many() ? kSayAgainInterval : has_to_tidy ? kTidyInterval : -1;
   const shm::Nanoseconds due = next_description();
   if (due == shm::kForever) return tidy;
   const shm::Nanoseconds left = std::max<shm::Nanoseconds>(0, due - shm::monotonic_now());
@@ -119,14 +121,16 @@ void NodeCore::pump(int timeout_ms) {
   epoll_event event{};
   static_cast<void>(epoll_wait(epoll_.get(), &event, 1, timeout_ms));
   tidy();
+  Socket socket;
   {
     const std::lock_guard lock(mutex_);
     say_what_waits();
     say_who_has_ended(Whom::kOwn);
     say_descriptions();
     if (!options_.service_thread) ring_when_to_look_again();
+    socket = socket_;
+    if (socket != nullptr && !hears()) return;
   }
-  const Socket socket = this->socket();
   if (socket == nullptr) {
     std::uint64_t rings = 0;
     if (::read(timer_.get(), &rings, sizeof rings) > 0) rejoin();
@@ -147,7 +151,8 @@ void NodeCore::pump(int timeout_ms) {
         return;
       }
     }
-    if (this->socket() != socket || has_notices()) return;
+    const std::lock_guard lock(mutex_);
+    if (socket_ != socket || !hears() || has_notices()) return;
   }
 }
 
@@ -155,6 +160,7 @@ void NodeCore::tidy() {
   std::vector<std::pair<shm::PortInstance, std::shared_ptr<const OutputPeer>>> to_look_at;
   tidy_ports(to_look_at);
   for (const auto& [port, peer] : to_look_at) look_at_growth(port, *peer);
+  try_missed_pages();
 }
 
 void NodeCore::tidy_ports(
@@ -191,7 +197,7 @@ void NodeCore::handle_without_descriptors(const wire::Message& message) {
   switch (message.kind) {
     case wire::MessageKind::kWelcome: {
       const std::lock_guard lock(mutex_);
-      lose_daemon();  // and tries again
+      put_off(why);
       return;
     }
     case wire::MessageKind::kOutputPeer:
@@ -204,12 +210,14 @@ void NodeCore::handle_without_descriptors(const wire::Message& message) {
       refuse_tap(message, why);
       return;
     case wire::MessageKind::kSourcePage:
-      miss_page(std::string(message.name_view()), why);
-      return;
+      // The daemon takes it for shown: it shows it again to a node that comes back.
+      note_missed(std::string(message.name_view()), why);
+      break;
     default:
       break;
   }
   const std::lock_guard lock(mutex_);
+  if (message.kind == wire::MessageKind::kSourcePage) return put_off(why);
   const bool is_opened = message.kind == wire::MessageKind::kOpened;
   if (is_opened) say_closed(message.port);  // what it is answered ends the wait
   const auto found = replies_.find(message.request);
@@ -288,39 +296,6 @@ void NodeCore::handle(wire::Received& received) {
     default:
       handle_reply(received);
       break;
-  }
-}
-
-void NodeCore::add_page(wire::Received& received) {
-  const wire::Message& message = received.message;
-  const std::string source(message.name_view());
-  try {
-    memory_->add_page(message.id, message.value, source, std::move(received.descriptors[0]));
-  } catch (const std::exception& error) {
-    if (memory_->pages().has(message.id, message.value)) {
-      say_not_locked(0, error.what());
-    } else {
-      miss_page(source, error.what());
-    }
-  }
-  wake_inputs();
-}
-
-// A port that could not see a source, or could not copy a large sample out of memory that it did
-// not know to be allocated, may have held back a sample and gone to sleep.
-void NodeCore::wake_inputs() {
-  const std::lock_guard lock(mutex_);
-  for (const auto& [instance, input] : inputs_) {
-    shm::ring_bell(input->bell().write_end().get());
-  }
-}
-
-// As far as the daemon's tables have been written: the one in force, and one that is to come.
-void NodeCore::make_tables_resident() {
-  try {
-    memory_->make_tables_resident();
-  } catch (const std::system_error& error) {
-    say_not_locked(0, error.what());
   }
 }
 

@@ -129,15 +129,12 @@ void NodeCore::forget_numbers_of_taps() {
 void NodeCore::reopen_taps() {
   reopened_.clear();
   forget_numbers_of_taps();
+  if (socket_ == nullptr) return;  // the next daemon is asked
   for (const auto& [instance, tap] : taps_) {
     if (!tap->is_open) continue;
-    wire::Message question;
-    question.kind = wire::MessageKind::kOpenTap;
-    question.request = next_request_++;
-    question.flags = wire::kRejoins | (tap->options().of == TapOf::input ? wire::kTapsInput : 0u);
-    question.set_name(tap->name());
-    reopened_[question.request] = tap;
-    say(question, {tap->segment_descriptor().get(), tap->bell().for_publishers().get()});
+    const std::uint64_t request = next_request_++;
+    reopened_[request] = tap;
+    due_.push_back({wire::MessageKind::kOpenTap, instance, 0, request});
   }
 }
 

@@ -188,7 +188,9 @@ Switchboard::Told Switchboard::link_one(const shm::TableView& table, shm::PortIn
   make_links(wanted, told);
   if (has_returned) {
     for (const LinkKey& key : links_of(port)) {
-      if (is_connected(key)) told.insert({&client_of(key.first), &client_of(key.second)});
+      if (!is_connected(key)) continue;
+      told.insert({&client_of(key.first), &client_of(key.second)});
+      fresh_.push_back(key);
     }
   }
   return told;

@@ -129,16 +129,22 @@ TEST(Introductions, ShowASegmentOnceItsOwnPublisherHasMadeRoom) {
   EXPECT_EQ(receiver.expect(MessageKind::kOutputGrown).message.peer, slow_port);
 }
 
-// How often it was asked to take up what came after the last output port that it was shown.
-int syncs_after_last_peer(RawClient& receiver) {
-  receiver.send(RawClient::message(MessageKind::kStatus));
+// What came after the last output port that it was shown: how often it was asked to take it up, and
+// to look at how much of that port's memory is used.
+struct AfterLastPeer {
   int syncs = 0;
+  int grown = 0;
+};
+AfterLastPeer after_last_peer(RawClient& receiver) {
+  receiver.send(RawClient::message(MessageKind::kStatus));
+  AfterLastPeer after;
   for (wire::Received received; receiver.receive(received);) {
-    if (received.message.kind == MessageKind::kOutputPeer) syncs = 0;
-    if (received.message.kind == MessageKind::kSync) ++syncs;
+    if (received.message.kind == MessageKind::kOutputPeer) after = {};
+    if (received.message.kind == MessageKind::kSync) ++after.syncs;
+    if (received.message.kind == MessageKind::kOutputGrown) ++after.grown;
     if (received.message.kind == MessageKind::kStatusReply) break;
   }
-  return syncs;
+  return after;
 }
 
 // Or samples would wait in a queue that the receiver does not know yet.
@@ -175,7 +181,9 @@ TEST(Introductions, OfAPortThatComesBackWhileItIsOpenedAreWaitedFor) {
   connect.port = opened.message.port;
   sender.send(connect);
   sender.expect(MessageKind::kConnected);
-  EXPECT_EQ(syncs_after_last_peer(receiver), 2) << "for the other's, and for its own";
+  const AfterLastPeer after = after_last_peer(receiver);
+  EXPECT_EQ(after.syncs, 3) << "for the other's, and for its own, once it has made room";
+  EXPECT_EQ(after.grown, 2) << "by the other's opening, and once its own publisher has made room";
 }
 
 TEST(Introductions, SayInTheLogOnceForWhomTheyDoNotWait) {

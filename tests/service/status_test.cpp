@@ -28,7 +28,7 @@ TEST(Status, TellsWhatAModelNamesThoughNobodyIsThere) {
   EXPECT_EQ(in["idle"], true);
   EXPECT_EQ(in["winner"], nullptr);
   EXPECT_EQ(in["connections"].size(), 2u);
-  EXPECT_EQ(in["connections"][0]["state"], "both ends closed");
+  EXPECT_EQ(in["connections"][0]["state"], "neither end open");
   ASSERT_EQ(in["senses"].size(), 1u);
   EXPECT_EQ(in["senses"][0]["source"], "/stop");
 }
@@ -72,12 +72,12 @@ TEST(Status, TellsWhichEndIsMissing) {
   Node node("test");
   {
     auto low = node.output_port<int>("/low");
-    EXPECT_EQ(daemon.connection("/low", "/in")["state"], "input port closed");
+    EXPECT_EQ(daemon.connection("/low", "/in")["state"], "input port not open");
     auto in = node.input_port<int>("/in");
     EXPECT_EQ(daemon.connection("/low", "/in")["state"], "connected");
   }
   auto in = node.input_port<int>("/in");
-  EXPECT_EQ(daemon.connection("/low", "/in")["state"], "output port closed");
+  EXPECT_EQ(daemon.connection("/low", "/in")["state"], "output port not open");
 }
 
 TEST(Status, TellsWhoWinsAndWhoIsActive) {

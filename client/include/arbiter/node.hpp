@@ -132,9 +132,8 @@ class Node {
   void switch_model(std::string_view name) { detail::switch_model(*core_, name); }
 
   // Without a service thread: takes up the daemon's news, and calls on_notice on this thread. Maps
-  // and allocates. Waits for the daemon only if the last one has gone, and the next one, to which
-  // it hands back its ports, does not read: up to a second each time. With a service thread it does
-  // nothing. service_fd() is readable when there is something to do; the node owns the descriptor.
+  // and allocates; does not wait for the daemon. With a service thread it does nothing.
+  // service_fd() is readable when there is something to do; the node owns the descriptor.
   void service() { detail::service(*core_); }
   [[nodiscard]] int service_fd() const noexcept { return detail::service_fd(*core_); }
 
