@@ -62,12 +62,13 @@ HostCard own_card(const LinkOptions& options, Incarnation incarnation) {
 
 }  // namespace
 
-Link::Link(LinkOptions options, Neighbours known)
+Link::Link(LinkOptions options, PeerWatch& peers, Neighbours known)
     : options_(std::move(options)),
       incarnation_(new_incarnation()),
       view_(options_.instance, options_.max_age),
       interfaces_(options_.network.interfaces.empty() ? std::vector<std::string>{"lo"}
                                                       : options_.network.interfaces),
+      peers_(peers),
       desk_(std::make_unique<Desk>(own_card(options_, incarnation_), std::move(known))) {
   gateway::dds::hear_cyclone();
 }
@@ -136,11 +137,24 @@ Link::End Link::run(int stop) {
 }
 
 bool Link::has_network_changed() {
-  const std::string change = interfaces_.change();
+  std::string change = interfaces_.change();
+  if (!change.empty()) {
+    network_->note_cut_off();
+  } else {
+    change = change_of_peers();
+  }
   if (change.empty()) return false;
-  network_->note_cut_off();
   say_sparingly(Level::kWarning, change + ": joining the network again");
   return true;
+}
+
+// To join again is silence for a while. Where as many hosts are there as have names, they have
+// found this one, or each other.
+std::string Link::change_of_peers() {
+  std::string change = peers_.change();
+  if (change.empty() || desk_->others().cards.size() < peers_.size()) return change;
+  peers_.accept();
+  return {};
 }
 
 void Link::say_what_passes() {
@@ -227,6 +241,7 @@ NetworkOptions Link::network_there() const {
 
 void Link::enter_network() {
   const NetworkOptions there = network_there();
+  peers_.accept();
   // The names of peers are looked up, and a name server may not answer.
   while_seen([&] { network_.emplace(there); });
   tokens_.emplace(*network_, [this](const TokenMessage& message, std::uint64_t writer) {

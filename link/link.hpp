@@ -32,6 +32,7 @@
 #include "link/host_view.hpp"
 #include "link/import.hpp"
 #include "link/interface_watch.hpp"
+#include "link/peer_watch.hpp"
 #include "link/token_clock.hpp"
 
 namespace arbiter::link {
@@ -52,8 +53,8 @@ struct LinkOptions {
 
 class Link {
  public:
-  // `known`: the hosts that it knew in an earlier life.
-  explicit Link(LinkOptions options, Neighbours known = {});
+  // `peers`: those of `options`; outlives it. `known`: the hosts that it knew in an earlier life.
+  Link(LinkOptions options, PeerWatch& peers, Neighbours known);
   Link(const Link&) = delete;
   Link& operator=(const Link&) = delete;
   ~Link();
@@ -81,6 +82,8 @@ class Link {
   End loop(int stop);
   // True, and said: the network has to be joined again.
   [[nodiscard]] bool has_network_changed();
+  // What has become of names of hosts that are missing; empty: nothing.
+  [[nodiscard]] std::string change_of_peers();
   // Once, when it is known.
   void say_what_passes();
   // Where the daemon does not know what this link has open: closes it. A node that has nothing open
@@ -114,6 +117,7 @@ class Link {
   bool has_said_what_passes_ = false;
   bool stops_ = false;
   InterfaceWatch interfaces_;
+  PeerWatch& peers_;
   // Of sources that were imported and are not wanted now: the model may want them again.
   std::map<std::string, Stream, std::less<>> streams_;
   std::mutex imports_mutex_;

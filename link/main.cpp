@@ -121,11 +121,11 @@ void require_peers(const NetworkOptions& network) {
                                      "address, such as 192.168.1.12, or put the name into "
                                      "/etc/hosts");
     }
-    gateway::say(gateway::Level::kWarning,
-                 "the address of --peer " + about + " cannot be found out now (" +
-                     gai_strerror(error) +
-                     "), so that this host is not looked for there; write its address, or put the "
-                     "name into /etc/hosts, and start the link again");
+    gateway::say(
+        gateway::Level::kWarning,
+        "the address of --peer " + about + " cannot be found out now (" + gai_strerror(error) +
+            "), so that this host is not looked for there until it can; write its address, "
+            "or put the name into /etc/hosts");
   }
 }
 
@@ -192,8 +192,9 @@ void serve(const LinkOptions& options, const shm::FileDescriptor& stop) {
   // A program that waits for an answer does not hold up the next link.
   std::vector<std::future<void>> closing;
   Neighbours known;
+  PeerWatch peers(options.network.peers);
   for (bool is_first = true;; is_first = false) {
-    Link link(options, std::move(known));
+    Link link(options, peers, std::move(known));
     if (is_first) sd_notify(0, "READY=1");
     if (link.run(stop.get()) == Link::End::kStopped) return;
     std::erase_if(closing, [](const std::future<void>& each) {

@@ -70,6 +70,9 @@ DdsMiddleware::DdsMiddleware(const std::vector<Mapping>& mappings, const Bell& b
       }
     }
   }
+  for (auto& [id, site] : sites_) order_.push_back(&site);
+  std::stable_partition(order_.begin(), order_.end(),
+                        [](const Site* site) { return !may_look_up_names(*site->gateway); });
   hold_low_descriptors();
 }
 
@@ -173,15 +176,15 @@ void DdsMiddleware::tend() {
   const std::uint64_t stops = guard_.stops();
   // To subscribe again, a participant is made, for which Cyclone waits while it joins a domain.
   const bool was_stopped = !is_joining() && std::exchange(stops_, stops) != stops;
-  for (auto& [id, site] : sites_) {
-    if (!site.domain && !open(site)) continue;
+  for (Site* const site : order_) {
+    if (!site->domain && !open(*site)) continue;
     try {
-      site.domain->peers().update();
-      if (was_stopped) subscribe_again(site);
-      for (EndPoint* const end : site.ends)
-        end->look_at(site.domain->peers().of(end->topic().name));
+      site->domain->peers().update();
+      if (was_stopped) subscribe_again(*site);
+      for (EndPoint* const end : site->ends)
+        end->look_at(site->domain->peers().of(end->topic().name));
     } catch (const DdsError& error) {  // an end that was opened again could not be
-      give_up(site, error);
+      give_up(*site, error);
     }
   }
 }

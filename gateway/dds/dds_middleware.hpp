@@ -83,6 +83,8 @@ class DdsMiddleware : public Middleware {
   StallGuard guard_;
   std::optional<StallThread> stall_thread_;
   std::map<dds_domainid_t, Site> sites_;
+  // Joined in this order: while Cyclone looks up a name for one, no other is joined.
+  std::vector<Site*> order_;
   std::list<OutTopic> outs_;
   std::map<std::string, OutTopic*> latching_;  // as LatchedSamples knows them
   std::map<const Entry*, OutTopic*> out_of_;

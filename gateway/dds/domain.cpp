@@ -3,6 +3,7 @@
 #include <dds/ddsrt/log.h>
 #include <dds/features.h>
 
+#include <algorithm>
 #include <cstdlib>
 #include <string_view>
 #include <system_error>
@@ -10,6 +11,7 @@
 #include "gateway/core/say.hpp"
 #include "gateway/dds/quota.hpp"
 #include "gateway/dds/repeats.hpp"
+#include "gateway/dds/steady_waits.hpp"
 #include "shm/clock.hpp"
 #include "shm/memory_file.hpp"
 
@@ -171,6 +173,13 @@ std::string configuration_of(const Gateway& gateway, const std::string& file) {
   return result + text;
 }
 
+bool may_look_up_names(const Gateway& gateway) {
+  const bool has_text =
+      !gateway.configuration.empty() || (gateway.interfaces.empty() && gateway.peers.empty() &&
+                                         std::getenv("CYCLONEDDS_URI") != nullptr);
+  return has_text || !std::all_of(gateway.peers.begin(), gateway.peers.end(), is_address);
+}
+
 Domain::Domain(const Gateway& gateway, const std::set<std::string>& topics, const Bell& bell)
     : id_(domain_of(gateway)),
       domain_(open_domain(id_, gateway)),
@@ -194,6 +203,7 @@ void CycloneWords::tell() const {
 }
 
 void hear_cyclone() {
+  wait_by_steady_clock();
   // What strangers send may make it write: their number must not fill a disk.
   static Quota& quota = *new Quota(20, 10'000'000'000);
   // While an interface is down, each datagram is one.

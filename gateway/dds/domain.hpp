@@ -21,6 +21,9 @@ namespace arbiter::gateway::dds {
 // interfaces and peers.
 [[nodiscard]] std::string configuration_of(const Gateway& gateway, const std::string& file);
 
+// Whether Cyclone may have to look up a name for it, which may take long.
+[[nodiscard]] bool may_look_up_names(const Gateway& gateway);
+
 // As text of that configuration.
 [[nodiscard]] std::string escaped(const std::string& text);
 

@@ -8,14 +8,15 @@ namespace {
 
 bool is_pattern(std::string_view name) { return name.find_first_of("*?") != name.npos; }
 
-// `*`: any characters; `?`: any one. Without recursion: the pattern is a stranger's.
+// `*`: any characters; `?`: any one; the name has neither. Without recursion: the pattern is a
+// stranger's.
 bool fits(std::string_view pattern, std::string_view name) {
   std::size_t p = 0;
   std::size_t n = 0;
   std::size_t star = pattern.npos;
   std::size_t resume = 0;
   while (n < name.size()) {
-    if (p < pattern.size() && (pattern[p] == '?' || pattern[p] == name[n]) && pattern[p] != '*') {
+    if (p < pattern.size() && (pattern[p] == '?' || pattern[p] == name[n])) {
       ++p;
       ++n;
     } else if (p < pattern.size() && pattern[p] == '*') {

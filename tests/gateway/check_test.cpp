@@ -136,6 +136,15 @@ TEST(CheckMapping, ABooleanThatAConditionAsksForMustNotLastForEver) {
   EXPECT_THAT(codes("all(/released*)", "forever"), ElementsAre(found));
 }
 
+// It would command for ever.
+TEST(CheckMapping, ABooleanThatCommandsMustNotLastForEver) {
+  const Read read = check(
+      dds("<in topic='/go' type='std_msgs/msg/Bool' true='/Go/yes:o'/>"),
+      "<behaviors><source port='/Go/yes:o' timeout='forever'/>"
+      "<behavior name='Go'><config at='/Base/go:i'>/Go/yes:o</config></behavior></behaviors>");
+  EXPECT_THAT(read.findings(), ElementsAre(HasSubstr("error forever-choice")));
+}
+
 // A stop that is pressed would count as released: both are messages.
 TEST(CheckMapping, ABooleanThatIsOnlyReadSaysWhichOfItsValuesCounts) {
   const std::string model = with_estop("/released:o and not /pressed:o", "200ms");
@@ -177,6 +186,17 @@ std::string chunks_in(const std::string& more) {
 std::string chunks_out(const std::string& more) {
   return "<out service='a' instance='b' event='cmd' port='/Base/cmd:i' idle='zero' size='8' " +
          more + "/>";
+}
+
+// They would not be connected.
+TEST(CheckMapping, AlignmentsOfConnectedTypesAgree) {
+  const std::string type = "type='T' alignment=";
+  const std::string other =
+      "<out service='a' instance='b' event='cmd' port='/Base/cmd:i' "
+      "idle='zero' size='8' type='T' alignment='16'/>";
+  EXPECT_THAT(check(iceoryx(chunks_in(type + "'16' size='8'") + other)).findings(), IsEmpty());
+  EXPECT_THAT(check(iceoryx(chunks_in(type + "'8' size='8'") + other)).findings(),
+              ElementsAre(HasSubstr("error types-differ")));
 }
 
 // Else bytes of the header would be the command.

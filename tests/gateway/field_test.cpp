@@ -88,6 +88,9 @@ TEST(Mapping, AFieldIsOneThatASampleHas) {
               HasSubstr("the sample that type=\"…\" asks for has 8"));
   const std::string topic = "<in service='a' instance='b' event='c' above='/a:o' below='/b:o' ";
   EXPECT_THAT(read_iceoryx(topic + "threshold='1' field='f32' offset='6'/>").findings(), IsEmpty());
+  const std::string last = topic + "threshold='1' field='f32' offset='4' max_size=";
+  EXPECT_THAT(read_iceoryx(last + "'8'/>").findings(), IsEmpty());
+  EXPECT_THAT(read_iceoryx(last + "'7'/>").message(), HasSubstr("beyond max_size, 7 bytes"));
   EXPECT_THAT(
       read_iceoryx(topic + "type='T' size='8' threshold='1' field='f32' offset='5'/>").message(),
       HasSubstr("a T has 8 bytes, and the field would end at 9"));

@@ -18,6 +18,7 @@ TEST(Partition, NamesPatternsAndTheDefaultOne) {
   EXPECT_FALSE(share_partition(Names{"robot?"}, Names{"robot"}));
   EXPECT_TRUE(share_partition(Names{"front/left"}, Names{"f*/*t"}));
   EXPECT_FALSE(share_partition(Names{"a*"}, Names{"*a"}));  // two patterns
+  EXPECT_FALSE(share_partition(Names{"a*"}, Names{"a*"}));
 }
 
 TEST(Partition, APatternThatIsMadeToBeSlowIsNot) {

@@ -15,11 +15,13 @@
 #include <cstdint>
 #include <cstring>
 #include <fstream>
+#include <memory>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "link/dds/host_search.hpp"
+#include "link/peer_watch.hpp"
 #include "shm/file_descriptor.hpp"
 #include "tests/link/cabled_robot.hpp"
 #include "tests/link/robot.hpp"
@@ -131,6 +133,85 @@ TEST_F(Cable, ALinkIsSeenToRunWhileANameServerDoesNotAnswer) {
   }
   EXPECT_GT(seen, 2) << base.log();
   EXPECT_NE(base.log().find("cannot be found out now"), std::string::npos) << base.log();
+}
+
+// A robot's router may be up later than its hosts: neither of them has found the other's name.
+TEST_F(Cable, ANameThatGetsAnAddressLaterIsLookedUpAgain) {
+  CabledRobot robot;
+  for (const int each : {kHead, kBase}) robot.cables.drop_multicast_to(each);
+  const std::string servers = robot.runtime.path() + "/resolv.conf";
+  std::ofstream(servers) << "nameserver 192.0.2.1\noptions timeout:1 attempts:1\n";
+  // `hosts`: what it has in place of /etc/hosts.
+  const auto start = [&](const std::string& name, const std::string& model,
+                         const NetworkNamespace& network, const std::string& hosts) {
+    std::ofstream(hosts) << "127.0.0.1 localhost\n";
+    std::vector<std::string> by = network.enter();
+    by.insert(by.end(), {"/usr/bin/unshare", "-m", "/bin/sh", "-c",
+                         "mount --bind " + servers + " /etc/resolv.conf && mount --bind " + hosts +
+                             " /etc/hosts && exec \"$@\"",
+                         "sh"});
+    std::vector<std::string> arguments = CabledRobot::arguments();
+    arguments.insert(arguments.end(), {"--peer", "other.example"});
+    return std::make_unique<Host>(name, robot.runtime, model, arguments, by);
+  };
+  const std::string hosts = robot.runtime.path() + "/hosts";
+  const auto head = start("head", source_model("300ms"), robot.head_network, hosts);
+  const auto base =
+      start("base", motor_model("300ms"), robot.base_network, robot.runtime.path() + "/others");
+  for (const auto* const each : {head.get(), base.get()}) each->see(", on eth0");
+  std::ofstream(hosts) << "10.77.0.2 other.example\n";
+  head->see("--peer other.example has the address 10.77.0.2 now: joining the network again");
+  Planner planner(*head);
+  Body body(*base);
+  body.drive(planner);
+}
+
+TEST(PeerAddresses, ChangeWhereNoneOfThoseIsLeftThatThereWere) {
+  link::PeerAddresses peers;
+  peers.note("base", {"10.0.0.1", "10.0.0.2"});
+  EXPECT_EQ(peers.change(1), "");
+  peers.note("base", {"10.0.0.2", "10.0.0.3"});
+  EXPECT_EQ(peers.change(1), "");
+  peers.note("base", {"10.0.0.3"});
+  EXPECT_EQ(peers.change(1), "--peer base has the address 10.0.0.3 now");
+  peers.accept(1);
+  EXPECT_EQ(peers.change(60'000'000'001), "");
+}
+
+TEST(PeerAddresses, AreThoseOfBeforeWhereNobodyKnowsThemNow) {
+  link::PeerAddresses peers;
+  peers.note("base", {"10.0.0.1"});
+  peers.note("base", {});
+  peers.accept(1);
+  peers.note("base", {"10.0.0.1"});
+  EXPECT_EQ(peers.change(1), "");
+}
+
+TEST(PeerAddresses, AreNewWhereThereWereNone) {
+  link::PeerAddresses peers;
+  peers.note("base", {});
+  EXPECT_EQ(peers.change(1), "");
+  peers.note("base", {"10.0.0.1"});
+  EXPECT_EQ(peers.change(1), "--peer base has the address 10.0.0.1 now");
+}
+
+// Each time the link joins its network again, and is silent for a while.
+TEST(PeerAddresses, ChangeOnceAMinuteAtMost) {
+  link::PeerAddresses peers;
+  peers.note("base", {"10.0.0.1"});
+  peers.accept(1);
+  peers.note("base", {"10.0.0.2"});
+  EXPECT_NE(peers.change(2), "");
+  peers.accept(2);
+  peers.note("base", {"10.0.0.1"});
+  EXPECT_EQ(peers.change(60'000'000'001), "");
+  EXPECT_NE(peers.change(60'000'000'002), "");
+}
+
+TEST(PeerAddresses, AreOfNamesAlone) {
+  EXPECT_EQ(link::name_of_peer("10.0.0.1"), "");
+  EXPECT_EQ(link::name_of_peer("10.0.0.1:7410"), "");
+  EXPECT_EQ(link::name_of_peer("base.local:7410"), "base.local");
 }
 
 }  // namespace

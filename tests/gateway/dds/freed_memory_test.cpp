@@ -1,11 +1,14 @@
 #include "gateway/dds/freed_memory.hpp"
 
 #include <gtest/gtest.h>
+#include <malloc.h>
 #include <sys/resource.h>
 
 #include <cstddef>
 #include <cstdlib>
 #include <vector>
+
+#include "gateway/dds/payload.hpp"
 
 namespace arbiter::gateway::dds {
 namespace {
@@ -37,6 +40,18 @@ TEST(FreedMemory, IsReceivedIntoAgainWithoutFaults) {
   constexpr int kRounds = 50;
   for (int i = 0; i < kRounds; ++i) receive_and_forget();
   EXPECT_LT(faults_of_this_thread() - before, kRounds) << "of 1024 pages in each round";
+}
+
+// Else one map in the morning would keep its memory from everybody all day.
+TEST(FreedMemory, OfHugeSamplesIsGivenBackToTheKernel) {
+  constexpr std::size_t kSize = std::size_t{200} << 20;
+  const std::size_t before = ::mallinfo2().hblkhd;
+  PayloadPool& pool = PayloadPool::of_process();
+  Payload* const payload = pool.take(kSize);
+  ASSERT_NE(payload, nullptr);
+  EXPECT_GE(::mallinfo2().hblkhd, before + kSize);
+  pool.give_back(payload);
+  EXPECT_EQ(::mallinfo2().hblkhd, before);
 }
 
 }  // namespace

@@ -72,6 +72,13 @@ TEST(Mismatch, PoliciesThatNoAttributeChangesAreNamedToo) {
                   "source time"));
 }
 
+TEST(Mismatch, AWriterThatMayBeLateIsNamedToo) {
+  Peer writer = peer(End::kWriter);
+  writer.qos.latency_budget = 1'000'000'000;
+  EXPECT_THAT(mismatches({End::kReader, topic(), false}, writer),
+              ElementsAre("latency budget: the writer offers 1000 ms, this entry asks for 0 ms"));
+}
+
 TEST(Mismatch, TypesOfRos2HaveTheNamesThatTheMappingGivesThem) {
   DdsTopic ours = topic();
   ours.is_ros = true;

@@ -57,9 +57,12 @@ TEST_P(ReaderCacheOf, ATopicGivesEachSampleWholeAndInOrderBeforeTheWriteReturns)
                         "reader");
     const Entity writer(dds_create_writer(participant.get(), topic.entity.get(), nullptr, nullptr),
                         "writer");
+    const auto payload_with = [&](const std::string& bytes) {
+      return make_payload(topic.type,
+                          Bytes(reinterpret_cast<const std::byte*>(bytes.data()), bytes.size()));
+    };
     const auto write = [&](const std::string& bytes) {
-      Payload* const payload = make_payload(
-          topic.type, Bytes(reinterpret_cast<const std::byte*>(bytes.data()), bytes.size()));
+      Payload* const payload = payload_with(bytes);
       EXPECT_EQ(dds_writecdr(writer.get(), &payload->cyclone), DDS_RETCODE_OK);
     };
     const std::string head("\0\1\0\0", 4);
@@ -68,11 +71,17 @@ TEST_P(ReaderCacheOf, ATopicGivesEachSampleWholeAndInOrderBeforeTheWriteReturns)
     write(head + std::string(100'000, 'x'));
     EXPECT_THAT(collected.all, ElementsAre(head + "a", head, head + std::string(100'000, 'x')));
     // Its last word on the instance is a sample all the same.
-    Payload* const last = make_payload(
-        topic.type, Bytes(reinterpret_cast<const std::byte*>(head.data()), head.size()));
+    Payload* const last = payload_with(head);
     last->cyclone.statusinfo = 1;  // disposed of
     last->cyclone.timestamp.v = dds_time();
     EXPECT_EQ(dds_forwardcdr(writer.get(), &last->cyclone), DDS_RETCODE_OK);
+    EXPECT_EQ(collected.all.size(), 4u);
+    // That the instance has ended is none: a publisher that goes would have one more arrival.
+    Payload* const end = payload_with(head);
+    end->cyclone.kind = SDK_KEY;
+    end->cyclone.statusinfo = 1;
+    end->cyclone.timestamp.v = dds_time();
+    EXPECT_EQ(dds_forwardcdr(writer.get(), &end->cyclone), DDS_RETCODE_OK);
     EXPECT_EQ(collected.all.size(), 4u);
   }
   // The reader has gone; another may have the same cache.

@@ -55,41 +55,92 @@ extern "C" int getaddrinfo(const char* node, const char* service, const addrinfo
 namespace arbiter::gateway::dds {
 namespace {
 
-// A service manager takes a gateway whose loop does not go round for one that hangs.
-TEST(DdsNames, ANameServerThatIsSilentHoldsUpItsDomainAndNotTheLoop) {
-  const test::OwnDomain number;
-  const Read read = read_text(
-      "<gateway kind='dds' interface='lo' domain='" + std::to_string(number.number()) +
-      "' peers='silent.example'><out port='/Base:i' topic='T' type='B' size='4'/></gateway>");
-  const std::vector<Mapping> mappings{read.mapping};
-  const Bell bell;
-  LatchedSamples latched;
-  DdsMiddleware middleware(mappings, bell, latched);
-  Account account(read.entry().outside(), "subscriber");
-  Sender& sender = middleware.sender(read.mapping.gateways.front(), read.entry(), account);
-  const auto send = [&] {
-    return sender.send({reinterpret_cast<const std::byte*>(kZeros.data()), kZeros.size()});
-  };
-  middleware.start({}, {});
-  middleware.tend();
-  test::await([] {
+class DdsNames : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    name_server().answers = false;
+    name_server().given_up = 0;
+  }
+  ~DdsNames() override { answer(); }
+
+  static void answer() {
     const std::lock_guard lock(name_server().mutex);
-    return name_server().is_asked || name_server().given_up != 0;
-  });
-  {
-    const std::lock_guard lock(name_server().mutex);
-    EXPECT_EQ(name_server().given_up, 0) << "the loop has waited for it";
-    EXPECT_EQ(send(), Sender::Result::kNotReady);
     name_server().answers = true;
     name_server().changed.notify_all();
   }
-  // The loop looks when it rings: for the last time once the domain is joined.
-  pollfd rings{bell.descriptor(), POLLIN, 0};
-  do {
-    ASSERT_EQ(::poll(&rings, 1, 30'000), 1);
-    bell.silence();
-    middleware.tend();
-  } while (send() != Sender::Result::kSent);
+  static int given_up() {
+    const std::lock_guard lock(name_server().mutex);
+    return name_server().given_up;
+  }
+  static void await_question() {
+    test::await([] {
+      const std::lock_guard lock(name_server().mutex);
+      return name_server().is_asked || name_server().given_up != 0;
+    });
+  }
+  static Sender::Result send(Sender& sender) {
+    return sender.send({reinterpret_cast<const std::byte*>(kZeros.data()), kZeros.size()});
+  }
+  // The loop looks when it rings, until that can be sent.
+  static void tend_until_sent(const Bell& bell, DdsMiddleware& middleware, Sender& sender) {
+    pollfd rings{bell.descriptor(), POLLIN, 0};
+    do {
+      ASSERT_EQ(::poll(&rings, 1, 30'000), 1);
+      bell.silence();
+      middleware.tend();
+    } while (send(sender) != Sender::Result::kSent);
+  }
+  static std::string gateway_of(const test::OwnDomain& domain, const std::string& port,
+                                const std::string& attributes = "") {
+    return "<gateway kind='dds' interface='lo' domain='" + std::to_string(domain.number()) + "' " +
+           attributes + "><out port='" + port + "' topic='T' type='B' size='4'/></gateway>";
+  }
+
+  const Bell bell_;
+  LatchedSamples latched_;
+};
+
+// A service manager takes a gateway whose loop does not go round for one that hangs.
+TEST_F(DdsNames, ANameServerThatIsSilentHoldsUpItsDomainAndNotTheLoop) {
+  const test::OwnDomain number;
+  const Read read = read_text(gateway_of(number, "/Base:i", "peers='silent.example'"));
+  const std::vector<Mapping> mappings{read.mapping};
+  DdsMiddleware middleware(mappings, bell_, latched_);
+  Account account(read.entry().outside(), "subscriber");
+  Sender& sender = middleware.sender(read.mapping.gateways.front(), read.entry(), account);
+  middleware.start({}, {});
+  middleware.tend();
+  await_question();
+  EXPECT_EQ(given_up(), 0) << "the loop has waited for it";
+  EXPECT_EQ(send(sender), Sender::Result::kNotReady);
+  answer();
+  tend_until_sent(bell_, middleware, sender);
+}
+
+// Cyclone joins one domain after the other.
+TEST_F(DdsNames, ADomainThatHasNoNamesIsServedThoughTheNameServerOfAnotherIsSilent) {
+  const test::OwnDomain one;
+  const test::OwnDomain two;
+  const bool is_one_first = one.number() < two.number();
+  const Read read = read_text(
+      "<gateways>" +
+      gateway_of(is_one_first ? one : two, "/Head:i", "peers='127.0.0.1,silent.example'") +
+      gateway_of(is_one_first ? two : one, "/Base:i", "peers='127.0.0.1'") + "</gateways>");
+  ASSERT_EQ(read.mapping.gateways.size(), 2u);
+  const std::vector<Mapping> mappings{read.mapping};
+  DdsMiddleware middleware(mappings, bell_, latched_);
+  const Gateway& named = mappings.front().gateways.front();
+  const Gateway& other = mappings.front().gateways.back();
+  Account account(named.entries.front().outside(), "subscriber");
+  Account other_account(other.entries.front().outside(), "subscriber");
+  Sender& of_named = middleware.sender(named, named.entries.front(), account);
+  Sender& of_other = middleware.sender(other, other.entries.front(), other_account);
+  middleware.start({}, {});
+  bell_.ring();
+  tend_until_sent(bell_, middleware, of_other);
+  EXPECT_EQ(given_up(), 0) << "it has waited for the other";
+  EXPECT_EQ(send(of_named), Sender::Result::kNotReady);
+  answer();  // or its end would wait
 }
 
 }  // namespace

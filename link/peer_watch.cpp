@@ -1,0 +1,131 @@
+#include "link/peer_watch.hpp"
+
+#include <arpa/inet.h>
+#include <netdb.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <condition_variable>
+#include <memory>
+#include <mutex>
+#include <system_error>
+#include <thread>
+#include <utility>
+
+#include "shm/clock.hpp"
+
+namespace arbiter::link {
+namespace {
+
+constexpr std::chrono::seconds kBetweenLooks{5};
+constexpr shm::Nanoseconds kBetweenChanges = 60'000'000'000;
+
+std::set<std::string> look_up(const std::string& name) {
+  addrinfo hints{};
+  hints.ai_family = AF_INET;
+  hints.ai_socktype = SOCK_DGRAM;
+  addrinfo* list = nullptr;
+  if (::getaddrinfo(name.c_str(), nullptr, &hints, &list) != 0) return {};
+  const std::unique_ptr<addrinfo, void (*)(addrinfo*)> owned(list, ::freeaddrinfo);
+  std::set<std::string> addresses;
+  for (const addrinfo* each = list; each != nullptr; each = each->ai_next) {
+    std::array<char, INET_ADDRSTRLEN> text{};
+    const auto* const to = reinterpret_cast<const sockaddr_in*>(each->ai_addr);
+    ::inet_ntop(AF_INET, &to->sin_addr, text.data(), text.size());
+    addresses.insert(text.data());
+  }
+  return addresses;
+}
+
+}  // namespace
+
+// The first answer is what DDS has had, too.
+void PeerAddresses::note(const std::string& name, std::set<std::string> addresses) {
+  const auto [place, is_first] = places_.try_emplace(name, Place{addresses, addresses});
+  if (!is_first && !addresses.empty()) place->second.now = std::move(addresses);
+}
+
+void PeerAddresses::accept(shm::Nanoseconds now) {
+  if (!change_of_any().empty()) quiet_until_ = now + kBetweenChanges;
+  for (auto& [name, place] : places_) place.joined = place.now;
+}
+
+std::string PeerAddresses::change(shm::Nanoseconds now) const {
+  return now < quiet_until_ ? std::string() : change_of_any();
+}
+
+std::string PeerAddresses::change_of_any() const {
+  for (const auto& each : places_) {
+    const Place& place = each.second;
+    const bool is_any_left =
+        std::any_of(place.now.begin(), place.now.end(),
+                    [&](const std::string& address) { return place.joined.contains(address); });
+    if (is_any_left || place.now.empty()) continue;
+    return "--peer " + each.first + " has the address " + *place.now.begin() + " now";
+  }
+  return {};
+}
+
+std::string name_of_peer(const std::string& peer) {
+  const std::string host = peer.substr(0, peer.find(':'));
+  in_addr ignored{};
+  return ::inet_aton(host.c_str(), &ignored) != 0 ? "" : host;
+}
+
+struct PeerWatch::Shared {
+  std::mutex mutex;
+  std::condition_variable news;
+  bool ends = false;
+  PeerAddresses addresses;
+
+  void look_for_ever(const std::vector<std::string>& names) {
+    for (;;) {
+      for (const std::string& name : names) {
+        auto found = look_up(name);
+        const std::lock_guard lock(mutex);
+        if (ends) return;
+        addresses.note(name, std::move(found));
+      }
+      std::unique_lock lock(mutex);
+      if (news.wait_for(lock, kBetweenLooks, [this] { return ends; })) return;
+    }
+  }
+};
+
+PeerWatch::PeerWatch(const std::vector<std::string>& peers) : shared_(std::make_shared<Shared>()) {
+  std::vector<std::string> names;
+  for (const std::string& peer : peers) {
+    if (std::string name = name_of_peer(peer); !name.empty()) names.push_back(std::move(name));
+  }
+  if (names.empty()) return;
+  try {
+    std::thread([shared = shared_, names] { shared->look_for_ever(names); }).detach();
+  } catch (const std::system_error&) {  // there is no thread left: nothing is looked up again
+  }
+}
+
+PeerWatch::~PeerWatch() {
+  const std::lock_guard lock(shared_->mutex);
+  shared_->ends = true;
+  shared_->news.notify_one();
+}
+
+void PeerWatch::accept() {
+  const std::lock_guard lock(shared_->mutex);
+  shared_->addresses.accept(shm::monotonic_now());
+}
+
+std::string PeerWatch::change() const {
+  const std::lock_guard lock(shared_->mutex);
+  return shared_->addresses.change(shm::monotonic_now());
+}
+
+std::size_t PeerWatch::size() const {
+  const std::lock_guard lock(shared_->mutex);
+  return shared_->addresses.size();
+}
+
+}  // namespace arbiter::link
