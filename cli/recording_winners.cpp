@@ -135,15 +135,27 @@ class Gaps {
   }
   // A source went inactive in one of its gaps: it may have arrived.
   [[nodiscard]] bool has(const Reign& reign) const {
-    const evidence::WinnerChange& change = reign.change;
-    if (change.why != evidence::WinnerChange::Why::expiry) return false;
-    const auto gaps = all_.find({reign.run, change.by});
-    if (gaps == all_.end()) return false;
-    const auto behind = gaps->second.upper_bound(change.time);
-    return behind != gaps->second.begin() && std::prev(behind)->second >= change.time;
+    return reign.change.why == evidence::WinnerChange::Why::expiry && around(reign).has_value();
+  }
+  // Of a source of which it was noticed late that it is active: when it may have become so at the
+  // earliest.
+  [[nodiscard]] std::optional<shm::Nanoseconds> earliest(const Reign& reign) const {
+    const bool is_late = reign.change.why == evidence::WinnerChange::Why::state;
+    return is_late ? around(reign) : std::nullopt;
   }
 
  private:
+  // Since when something is missing of the source that has made the change; nothing: nothing is.
+  [[nodiscard]] std::optional<shm::Nanoseconds> around(const Reign& reign) const {
+    const evidence::WinnerChange& change = reign.change;
+    const auto gaps = all_.find({reign.run, change.by});
+    if (gaps == all_.end()) return std::nullopt;
+    const auto behind = gaps->second.upper_bound(change.time);
+    if (behind == gaps->second.begin()) return std::nullopt;
+    const auto& [from, to] = *std::prev(behind);
+    return to >= change.time ? std::optional(from) : std::nullopt;
+  }
+
   // From when to when.
   std::map<std::pair<const evidence::Run*, std::string>,
            std::map<shm::Nanoseconds, shm::Nanoseconds>>
@@ -161,7 +173,8 @@ ordered_json death_json(const evidence::PortChange* death) {
   return {{"node", death->node}, {"pid", death->pid}, {"at_ns", death->seen}};
 }
 
-std::string cause_text(const evidence::WinnerChange& change) {
+std::string cause_text(const Reign& reign, const Gaps& gaps, shm::Nanoseconds offset) {
+  const evidence::WinnerChange& change = reign.change;
   const std::string by = shm::printable(change.by);
   switch (change.why) {
     case evidence::WinnerChange::Why::start:
@@ -169,7 +182,8 @@ std::string cause_text(const evidence::WinnerChange& change) {
     case evidence::WinnerChange::Why::arrival:
       return by + " arrived";
     case evidence::WinnerChange::Why::expiry:
-      return by + " went inactive";
+      return by + " went inactive" +
+             (gaps.has(reign) ? ", unless it arrived in what was missed" : "");
     case evidence::WinnerChange::Why::deactivation:
       return by + " was deactivated";
     case evidence::WinnerChange::Why::model:
@@ -177,7 +191,10 @@ std::string cause_text(const evidence::WinnerChange& change) {
     case evidence::WinnerChange::Why::state:
       break;
   }
-  return "noticed late";
+  const auto earliest = gaps.earliest(reign);
+  if (!earliest) return "noticed late";
+  return "noticed late: what " + by + " did from " + clock_text(*earliest + offset) +
+         " on was missed, so it may have begun since then";
 }
 
 std::string length_text(const Reign& reign) {
@@ -220,6 +237,7 @@ void write_reigns_json(const std::vector<Reign>& reigns, const Gaps& gaps,
   for (const Reign& reign : reigns) {
     const evidence::WinnerChange& change = reign.change;
     const Publishers publishers = components.of(reign);
+    const auto earliest = gaps.earliest(reign);
     ordered_json one{
         {"from", clock_text(change.time + offset)},
         {"from_ns", change.time},
@@ -231,6 +249,7 @@ void write_reigns_json(const std::vector<Reign>& reigns, const Gaps& gaps,
         {"why", evidence::name_of(change.why)},
         {"by", change.by},
         {"is_in_gap", gaps.has(reign)},
+        {"earliest_ns", earliest ? ordered_json(*earliest) : ordered_json()},
         {"died", death_json(components.death_behind(reign))},
         {"generation", change.generation}};
     if (publishers.others != 0) one["other_components"] = publishers.others;
@@ -251,8 +270,7 @@ void write_reigns(const std::vector<Reign>& reigns, const Gaps& gaps, shm::Nanos
     std::cout << clock_text(change.time + offset) << "  " << shm::printable(change.port) << "  "
               << (change.winner.empty() ? "idle" : shm::printable(change.winner))
               << components_text(components.of(reign)) << "  " << length_text(reign) << ": "
-              << cause_text(change)
-              << (gaps.has(reign) ? ", unless it arrived in what was missed" : "")
+              << cause_text(reign, gaps, offset)
               << death_text(reign, components.death_behind(reign)) << '\n';
   }
 }
@@ -315,7 +333,7 @@ void add_recorded_winners(CLI::App& parent, int& exit_code) {
       ->type_name("PATTERN");
   verb->add_flag("--json", options->json,
                  "A list of {from, from_ns, to_ns, cut_off, port, winner, components, why, by, "
-                 "is_in_gap, died, generation}");
+                 "is_in_gap, earliest_ns, died, generation}");
   verb->footer(
       "Example:\n  arbiter recording winners incident.mcap --at 14:03:07\n\n"
       "Exit codes: 0 shown; 1 a file that `arbiter record` has not made; 2 wrong use, a time that "

@@ -87,8 +87,10 @@ recorder::RecorderOptions recorder_options(const RecordOptions& options) {
 void write_summary(const recorder::Recorded& recorded, const std::string& file,
                    std::uint64_t bytes) {
   std::ostringstream out;
+  constexpr std::size_t kMost = recorder::CountedSources::kMost;
   out << rules::counted(recorded.arrivals, "arrival") << " of "
-      << rules::counted(recorded.sources, "source") << " and "
+      << (recorded.sources > kMost ? "more than " : "")
+      << rules::counted(std::min(recorded.sources, kMost), "source") << " and "
       << rules::counted(recorded.winner_changes, "change") << " of winner in "
       << seconds_text(recorded.time) << ": " << file << ", " << size_text(bytes) << '\n';
   if (recorded.lost_events != 0 || recorded.lost_samples != 0) {

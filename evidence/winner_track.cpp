@@ -60,8 +60,24 @@ void WinnerTrack::apply(const std::string& source, ActivityWord word, Nanosecond
     const Nanoseconds deactivated = shm::time_of(word, shm::kForever);
     look_where(id, deactivated, WinnerChange::Why::deactivation, source);
   } else {
-    look_where(id, now_, why, source);
+    look_where(id, time == 0 ? now_ : time, why, source);
   }
+}
+
+// Arrivals are told; a deactivation may be an operator's, of which nobody tells.
+void WinnerTrack::join(const std::string& source, ActivityWord word) {
+  const shm::SourceId id = rules_ == nullptr ? shm::kNone : rules_->source(source);
+  if (id != shm::kNone) {
+    const ActivityWord before = by_id_[id];
+    const Nanoseconds timeout = rules_->table.timeout(id);
+    const bool has_unknown_time = shm::is_finite(word) && timeout == shm::kForever;
+    if (!has_unknown_time && shm::time_of(word, timeout) > now_) {
+      if (!shm::is_deactivation(word) || !shm::is_active(before, now_)) return;
+      word = shm::time_of(word, timeout);
+      if (shm::is_finite(before)) word = std::min(word, before);
+    }
+  }
+  apply(source, word, 0, WinnerChange::Why::state);
 }
 
 // At the moment of its end an activity is over.

@@ -33,6 +33,8 @@ class WinnerTrack {
                  Nanoseconds time);
   // An event at a source, after which its activity is `word`.
   void apply(const std::string& source, ActivityWord word, Nanoseconds time, WinnerChange::Why why);
+  // What a publisher finds where it begins to tell: what has made it so may be told behind it.
+  void join(const std::string& source, ActivityWord word);
   // Time has passed.
   void advance(Nanoseconds time);
 

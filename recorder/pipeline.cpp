@@ -13,6 +13,11 @@ using Why = WinnerChange::Why;
 
 // How long the thread sleeps where nothing comes.
 constexpr std::chrono::milliseconds kTick{100};
+// What comes late: the first arrivals of a component, until its tap reaches it, and models, until
+// they are noticed. The rest waits for these, once or twice as long, unless it takes too much
+// memory.
+constexpr Nanoseconds kWaitForLate = 200'000'000;
+constexpr std::size_t kMostHeldBack = std::size_t{16} << 20;
 
 // By which records are ordered. What a publisher says of its source counts for the last arrival:
 // where some were lost, one that is later than all that has been told.
@@ -32,6 +37,7 @@ void TimeOrder::add(RecordPtr record, Nanoseconds now) {
     Nanoseconds& last = last_[context->source];
     key = last = std::max(last, key);
   }
+  bytes_ += evidence::size_of(*record);
   waiting_.push({key, number_++, std::move(record)});
 }
 
@@ -60,33 +66,50 @@ void Pipeline::work() {
     if (auto batch = queue_.pop(kTick)) take(std::move(*batch));
     sink_.tick(shm::monotonic_now(), horizon_);
   }
-  order_.take_before(shm::kForever, [this](const RecordPtr& record) { pass_on(record); });
-  sink_.finish(horizon_);
+  pass_on_before(newest_, shm::kForever);
+  sink_.finish(newest_);
 }
 
 void Pipeline::take(Batch&& batch) {
   if (batch.is_start) {
-    order_.take_before(shm::kForever, [this](const RecordPtr& record) { pass_on(record); });
+    pass_on_before(newest_, shm::kForever);
     for (const RecordPtr& record : batch.records) pass_on(record);
     return;
   }
   const Nanoseconds now = shm::monotonic_now();
   for (RecordPtr& record : batch.records) order_.add(std::move(record), now);
-  order_.take_before(batch.horizon, [this](const RecordPtr& record) { pass_on(record); });
-  if (batch.horizon == 0) return;
-  horizon_ = batch.horizon;
-  winners_.advance(batch.horizon - 1);  // what ends without an event
+  newest_ = std::max(newest_, batch.horizon);
+  if (order_.bytes() > kMostHeldBack) {
+    horizon_ = next_ = newest_;
+  } else if (now - noted_ >= kWaitForLate) {
+    noted_ = now;
+    horizon_ = std::exchange(next_, newest_);
+  }
+  pass_on_before(horizon_, horizon_);
+}
+
+// `known`: what ends before it without an event has ended.
+void Pipeline::pass_on_before(Nanoseconds known, Nanoseconds horizon) {
+  order_.take_before(horizon, [this](const RecordPtr& record) { pass_on(record); });
+  if (known != 0) advance(known - 1);
+}
+
+void Pipeline::advance(Nanoseconds time) {
+  winners_.advance(time);
+  write_changes();
+}
+
+void Pipeline::write_changes() {
   for (const RecordPtr& change : std::exchange(changes_, {})) sink_.write(change);
 }
 
 // Winners change behind what has changed them.
 void Pipeline::pass_on(const RecordPtr& record) {
   const Nanoseconds time = std::min(key_of(*record), shm::monotonic_now());
-  if (time != 0) winners_.advance(time - 1);
-  for (const RecordPtr& change : std::exchange(changes_, {})) sink_.write(change);
+  if (time != 0) advance(time - 1);
   sink_.write(record);
   follow(*record);
-  for (const RecordPtr& change : std::exchange(changes_, {})) sink_.write(change);
+  write_changes();
 }
 
 void Pipeline::follow(const Record& record) {
@@ -98,7 +121,11 @@ void Pipeline::follow(const Record& record) {
     winners_.apply(over->context->source, shm::deactivation(over->time), over->time,
                    Why::deactivation);
   } else if (const auto* state = std::get_if<evidence::SourceState>(&record)) {
-    winners_.apply(state->context->source, state->word, state->time, Why::state);
+    if (state->why == evidence::SourceState::Why::joined) {
+      winners_.join(state->context->source, state->word);
+    } else {
+      winners_.apply(state->context->source, state->word, state->time, Why::state);
+    }
   } else if (const auto* model = std::get_if<evidence::ModelChange>(&record)) {
     winners_.set_rules(model->table, model->generation, model->time);
   }

@@ -1,5 +1,6 @@
 // From the queue to where records go: brings them into the order of time, works out who wins, and
-// hands both on. A thread of its own, which may wait for a disk.
+// hands both on, some tenths of a second late, for some things are told late. A thread of its own,
+// which may wait for a disk.
 #pragma once
 
 #include <algorithm>
@@ -33,6 +34,7 @@ class TimeOrder {
     while (!waiting_.empty() && waiting_.top().key < horizon) {
       const RecordPtr record = waiting_.top().record;
       waiting_.pop();
+      bytes_ -= evidence::size_of(*record);
       use(record);
     }
     if (last_.size() <= 2 * kept_) return;
@@ -42,6 +44,8 @@ class TimeOrder {
   }
   // Of how many sources something is kept.
   [[nodiscard]] std::size_t sources() const { return last_.size(); }
+  // Of what waits.
+  [[nodiscard]] std::size_t bytes() const { return bytes_; }
 
  private:
   struct Waiting {
@@ -57,6 +61,7 @@ class TimeOrder {
   std::unordered_map<std::string, Nanoseconds> last_;  // key of each source that has told lately
   std::size_t kept_ = kFewSources;                     // of them, when it was last looked
   std::uint64_t number_ = 0;
+  std::size_t bytes_ = 0;
 };
 
 class Pipeline {
@@ -78,14 +83,20 @@ class Pipeline {
   void work();
   void join();
   void take(Batch&& batch);
+  void pass_on_before(Nanoseconds known, Nanoseconds horizon);
   void pass_on(const RecordPtr& record);
+  void advance(Nanoseconds time);
+  void write_changes();
   void follow(const Record& record);
 
   RecordQueue& queue_;
   Sink& sink_;
   const std::function<void()> failed_;
   TimeOrder order_;
-  Nanoseconds horizon_ = 0;
+  Nanoseconds newest_ = 0;   // what happened before has come
+  Nanoseconds next_ = 0;     // this, when it was noted
+  Nanoseconds noted_ = 0;    // then
+  Nanoseconds horizon_ = 0;  // what happened before has been passed on
   evidence::WinnerTrack winners_;
   std::vector<RecordPtr> changes_;  // of winners, by the record that is being followed
   std::uint64_t winner_changes_ = 0;

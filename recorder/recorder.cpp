@@ -77,7 +77,7 @@ void Recorder::count(const TapReader& tap) {
   recorded_.arrivals += tap.counts().arrivals;
   recorded_.lost_events += tap.counts().lost_events;
   recorded_.lost_samples += tap.counts().lost_samples;
-  if (tap.counts().arrivals != 0) heard_.insert(tap.name());
+  if (tap.counts().arrivals != 0) heard_.note(tap.name());
 }
 
 void Recorder::forget_taps() {
@@ -100,7 +100,7 @@ Recorded Recorder::finish() {
   forget_taps();
   queue_.close();
   pipeline_.finish();
-  recorded_.sources = heard_.size();
+  recorded_.sources = heard_.count();
   recorded_.winner_changes = pipeline_.winner_changes();
   recorded_.time = shm::monotonic_now() - started_;
   return recorded_;

@@ -7,8 +7,8 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
-#include <set>
 #include <string>
+#include <unordered_set>
 #include <vector>
 
 #include "recorder/options.hpp"
@@ -21,9 +21,24 @@
 
 namespace arbiter::recorder {
 
+// How many sources there were, by their names: these may come and go for as long as it is recorded.
+// Beyond kMost it only knows that there were more.
+class CountedSources {
+ public:
+  static constexpr std::size_t kMost = 65'536;
+
+  void note(const std::string& name) {
+    if (hashes_.size() <= kMost) hashes_.insert(std::hash<std::string>()(name));
+  }
+  [[nodiscard]] std::size_t count() const { return hashes_.size(); }
+
+ private:
+  std::unordered_set<std::size_t> hashes_;
+};
+
 struct Recorded {
   std::uint64_t arrivals = 0;
-  std::size_t sources = 0;  // that something was recorded of
+  std::size_t sources = 0;  // that something was recorded of, as CountedSources has it
   std::uint64_t winner_changes = 0;
   std::uint64_t lost_events = 0;
   std::uint64_t lost_samples = 0;
@@ -63,7 +78,7 @@ class Recorder {
   Nanoseconds last_push_ = 0;
   Nanoseconds started_ = 0;
   Recorded recorded_;
-  std::set<std::string> heard_;
+  CountedSources heard_;
 };
 
 }  // namespace arbiter::recorder

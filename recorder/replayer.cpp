@@ -48,9 +48,7 @@ std::string advice_for(const std::string& refusal, const std::string& port) {
 }
 
 // What `arbiter winners` says of the instance itself counts there, not what it said elsewhere.
-bool is_announced_there(const std::string& source, const std::string& refusal) {
-  return source.starts_with("/arbiter/winner/") && is_taken(refusal);
-}
+bool is_announcement(const std::string& source) { return source.starts_with("/arbiter/winner/"); }
 
 // By the rule of ports (Type).
 bool have_one_type(const evidence::SourceContext& one, const evidence::SourceContext& other) {
@@ -76,9 +74,10 @@ Replayer::Replayer(const ReplayOptions& options) : options_(options) {
   if (sources_.empty()) {
     throw NothingChosen(options_.file + " has no arrival of what you have chosen");
   }
-  refuse_without_payloads();
+  refuse_without_payloads(is_announcement);  // these may be left out
   if (options_.speed > 0) require_end(options_.file, latest_ - first_, options_.speed);
   open_ports();
+  refuse_without_payloads([](const std::string&) { return false; });
 }
 
 void Replayer::survey() {
@@ -174,16 +173,22 @@ bool Replayer::is_at_chosen_port(const std::string& source) const {
   return false;
 }
 
-void Replayer::refuse_without_payloads() const {
+void Replayer::refuse_without_payloads(const Excepted& is_excepted) const {
   std::string without;
+  bool has_announcement = false;
   for (const auto& [name, source] : sources_) {
-    if (source.samples == 0 || source.payloads != 0) continue;
+    if (source.samples == 0 || source.payloads != 0 || is_excepted(name)) continue;
+    has_announcement = has_announcement || is_announcement(name);
     without += (without.empty() ? "" : ", ") + name;
   }
   if (without.empty()) return;
   throw ReplayError(options_.file + " does not have what was in the samples of " + without +
                     ", so they cannot be published: choose other sources with --source, or record "
-                    "with --payloads all");
+                    "with --payloads all" +
+                    (has_announcement
+                         ? "; announcements of who commands are left out if `arbiter winners` runs "
+                           "in the instance"
+                         : ""));
 }
 
 void Replayer::open_port(const std::string& name, Source& source) {
@@ -202,7 +207,7 @@ void Replayer::open_ports() {
     try {
       open_port(name, source);
     } catch (const Error& error) {
-      if (is_announced_there(name, error.what())) {
+      if (is_announcement(name) && is_taken(error.what())) {
         announced.push_back(name);
         continue;
       }

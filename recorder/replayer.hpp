@@ -91,7 +91,8 @@ class Replayer {
   void survey(const evidence::SourceState& state, Source& source);
   void choose();
   [[nodiscard]] bool is_at_chosen_port(const std::string& source) const;
-  void refuse_without_payloads() const;
+  using Excepted = std::function<bool(const std::string& source)>;
+  void refuse_without_payloads(const Excepted& is_excepted) const;
   void open_port(const std::string& name, Source& source);
   void open_ports();
   void signal_active_ones();

@@ -63,7 +63,7 @@ class Ring : public Sink {
   explicit Ring(RingOptions options)
       : options_(std::move(options)), own_files_(options_.prefix, options_.keep) {}
 
-  // Any thread: write a file as soon as all that has happened by now is here, some twentieths of a
+  // Any thread: write a file as soon as all that has happened by now is here, some tenths of a
   // second at most; of its own accord, later. Returns the number of the request, which may be that
   // of others for the same cause that wait.
   std::uint64_t request(Cause cause);

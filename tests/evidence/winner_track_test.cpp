@@ -86,7 +86,7 @@ TEST_F(TrackedWinners, AreKnownWithoutTheSourcesThatAreOver) {
   EXPECT_EQ(track_.sources(), 60u);
   track_.advance(2000);
   EXPECT_EQ(track_.sources(), 0u);
-  EXPECT_EQ(told(), (Lines{"199 /low arrival /low", "650 - expiry /low"}));
+  EXPECT_EQ(told(), (Lines{"150 /low arrival /low", "650 - expiry /low"}));
 }
 
 TEST_F(TrackedWinners, ChangeByTheModel) {
@@ -108,11 +108,31 @@ TEST_F(TrackedWinners, AnActivityMayEndEarlierThanItWasSaidTo) {
   EXPECT_EQ(told().back(), "700 - expiry /low");
 }
 
-TEST_F(TrackedWinners, WhatComesLateCountsFromThenOn) {
-  arrive("/low", 300);
+// As far as nothing else has mattered since.
+TEST_F(TrackedWinners, WhatComesLateCountsFromItsTimeOn) {
+  track_.advance(250);
+  arrive("/low", 200);
+  EXPECT_EQ(told().back(), "200 /low arrival /low");
   track_.advance(350);
-  arrive("/high", 200);
-  EXPECT_EQ(told().back(), "350 /high arrival /high");
+  arrive("/high", 150);
+  EXPECT_EQ(told().back(), "250 /high arrival /high");
+}
+
+// The recorder was stopped: it reads first what a publisher has found since, and then its events.
+TEST_F(TrackedWinners, WhatAPublisherFindsMayBeOfLater) {
+  arrive("/low", 300);
+  track_.join("/high", 600 + 500);
+  track_.join("/low", shm::deactivation(700));
+  EXPECT_EQ(told(), (Lines{"300 /low arrival /low"}));
+  arrive("/low", 400);
+  track_.advance(1000);
+  EXPECT_EQ(told(), (Lines{"900 - expiry /low"}));
+  arrive("/low", 1100);
+  track_.join("/low", shm::deactivation(1200));
+  track_.advance(1300);
+  EXPECT_EQ(told(), (Lines{"1100 /low arrival /low", "1200 - expiry /low"}));
+  track_.join("/high", 1250 + 500);
+  EXPECT_EQ(told().back(), "1300 /high state /high");
 }
 
 }  // namespace

@@ -250,12 +250,16 @@ TEST(RecordedWinners, DoNotTakeWhatWasMissedForSilence) {
   const auto result = arbiter({"recording", "winners", file});
   EXPECT_THAT(result.out,
               testing::ContainsRegex("idle .*: /low went inactive, unless it arrived in what was "
-                                     "missed\n.*: noticed late\n.*: /low went inactive\n"));
+                                     "missed\n.*: noticed late: what /low did from 1970-01-01 "
+                                     "[0-9:.]* on was missed, so it may have begun since then\n"
+                                     ".*: /low went inactive\n"));
   EXPECT_THAT(result.err, testing::HasSubstr("missed 9 events: who commanded is uncertain in 1 "
                                              "gap from "));
   const auto found = nlohmann::json::parse(arbiter({"recording", "winners", "--json", file}).out);
   EXPECT_EQ(found[1]["is_in_gap"], false);
   EXPECT_EQ(found[2]["is_in_gap"], true);
+  EXPECT_EQ(found[2]["earliest_ns"], nullptr);
+  EXPECT_EQ(found[3]["earliest_ns"], 1100);
 }
 
 TEST(RecordedWinners, SaysThatNobodyHasWon) {

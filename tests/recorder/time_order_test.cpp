@@ -4,11 +4,13 @@
 #include <algorithm>
 #include <cstddef>
 #include <memory>
+#include <semaphore>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "recorder/pipeline.hpp"
+#include "recorder/recorder.hpp"
 
 namespace arbiter::test {
 namespace {
@@ -76,6 +78,76 @@ TEST(TimeOrder, ForgetsSourcesThatTellNoMore) {
   }
   EXPECT_EQ(taken, 9'999u);
   EXPECT_LT(most, 5'000u);
+}
+
+// Where records go, from the pipeline's thread.
+class Kept : public recorder::Sink {
+ public:
+  void write(const recorder::RecordPtr& record) override {
+    sources.push_back(evidence::context_of(*record)->source);
+    written.release();
+  }
+  void tick(evidence::Nanoseconds, evidence::Nanoseconds) override {}
+  void finish(evidence::Nanoseconds horizon) override { end = horizon; }
+
+  std::vector<std::string> sources;
+  evidence::Nanoseconds end = 0;
+  std::counting_semaphore<> written{0};
+};
+
+class PipelineTest : public testing::Test {
+ protected:
+  void push(const char* source, evidence::Nanoseconds time, evidence::Nanoseconds horizon,
+            std::size_t bytes = 0) {
+    auto context = std::make_shared<evidence::SourceContext>();
+    context->source = source;
+    evidence::Arrival arrival;
+    arrival.context = std::move(context);
+    arrival.time = time;
+    arrival.payload.emplace(bytes);
+    recorder::Batch batch;
+    batch.add(std::move(arrival));
+    batch.horizon = horizon;
+    queue_.push(std::move(batch));
+  }
+
+  recorder::RecordQueue queue_;
+  Kept kept_;
+  recorder::Pipeline pipeline_{queue_, kept_, [] {}};
+};
+
+// A component has just begun, or the recorder was stopped: its tap is behind the others.
+TEST_F(PipelineTest, WhatIsToldLateStandsAtItsTime) {
+  push("/early", 100, 50);
+  push("/later", 300, 400);
+  push("/late", 200, 500);
+  queue_.close();
+  pipeline_.finish();
+  EXPECT_EQ(kept_.sources, (std::vector<std::string>{"/early", "/late", "/later"}));
+  EXPECT_EQ(kept_.end, 500);
+}
+
+// Not for the 16 MiB of a large sample.
+TEST_F(PipelineTest, NothingWaitsThatTakesMuchMemory) {
+  push("/large", 100, 200, std::size_t{17} << 20);
+  kept_.written.acquire();
+  push("/late", 50, 300);
+  queue_.close();
+  pipeline_.finish();
+  EXPECT_EQ(kept_.sources, (std::vector<std::string>{"/large", "/late"}));
+}
+
+// Names may come and go for as long as it is recorded.
+TEST(CountedSources, AreCountedOnceAndUpToABound) {
+  constexpr std::size_t kMost = recorder::CountedSources::kMost;
+  recorder::CountedSources sources;
+  for (std::size_t i = 0; i < kMost; ++i) {
+    sources.note("/passing" + std::to_string(i));
+    sources.note("/stays");
+  }
+  EXPECT_EQ(sources.count(), kMost + 1);
+  sources.note("/one more");
+  EXPECT_EQ(sources.count(), kMost + 1);
 }
 
 }  // namespace
