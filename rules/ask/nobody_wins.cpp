@@ -270,7 +270,8 @@ class PortFindings {
     blocked = winners_->combine(Connective::kAnd, blocked, winners_->given(y.wins, z, lacks_z));
     std::vector<std::string> names;
     std::optional<Witness> shortest;
-    bool is_known = true;  // to be a shortest of all
+    std::string would_win;  // in it
+    bool is_known = true;   // to be a shortest of all
     for (std::size_t i = 0; i < candidates_.size(); ++i) {
       if (blocked.is_false()) return false;
       if (!silenced[i]) continue;
@@ -280,7 +281,10 @@ class PortFindings {
       if (states.is_false()) continue;
       const Witness witness = winners_->witness(states);
       is_known = is_known && witness.is_shortest;
-      if (!shortest || size(witness) < size(*shortest)) shortest = witness;
+      if (!shortest || size(witness) < size(*shortest)) {
+        shortest = witness;
+        would_win = x->rule->source;
+      }
       names.push_back(x->rule->source);
     }
     if (!shortest) return false;
@@ -289,7 +293,7 @@ class PortFindings {
     diagnostics_.note("starved", where_of(by),
                       "at " + port_.port + ", " + by + " silences " + others + " even while " +
                           (lacks_z ? by + " cannot win for want of " + z : z + " silences " + by) +
-                          ": with " + in_words(*shortest) + ", nobody wins; if " + names.front() +
+                          ": with " + in_words(*shortest) + ", nobody wins; if " + would_win +
                           " should win then, let no inhibition but its condition \"not " + by +
                           (lacks_z ? " or not " : " or ") + z + "\" keep it out",
                       {.ports = {port_.port}, .source = by}, *shortest);

@@ -17,6 +17,7 @@ namespace {
 using rules::Diagnostic;
 using rules::Diagnostics;
 using rules::FindingsAccount;
+using testing::Contains;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
@@ -74,6 +75,17 @@ TEST(Findings, NameAShortestStateWithoutAWinnerAndItsPlace) {
             "/stop active and /off inactive, nobody wins; if /low should win then, let no "
             "inhibition but its condition \"not /high or /stop\" keep it out");
   EXPECT_EQ(found.items[1].where.line, 3u);
+}
+
+TEST(Findings, NameOfThoseSilencedTheOneThatTheStateIsAbout) {
+  const auto found = found_in(
+      RulesByHand().port("/p", {{"/far", all_of({inactive("/high"), active("/a"), active("/b")})},
+                                {"/near", inactive("/high")},
+                                {"/high", inactive("/stop")}}));
+  ASSERT_THAT(found.codes(), Contains("starved"));
+  EXPECT_THAT(
+      found.items.back().message,
+      HasSubstr("with /high, /near and /stop active, nobody wins; if /near should win then"));
 }
 
 // What first models get wrong: the inhibitor is active, but its own condition is not fulfilled.
