@@ -1,7 +1,9 @@
 #include "cli/changes.hpp"
 
 #include <cstdint>
+#include <functional>
 #include <iostream>
+#include <optional>
 #include <set>
 #include <string>
 #include <string_view>
@@ -35,18 +37,50 @@ void write_in_force(const wire::ChangeReport& report) {
   }
 }
 
-// Those of the input ports that somebody has open, after a text that says what is wrong with them.
-void write_open(const std::string& verb, const std::string& instance, const std::string& what,
-                const auto& is_wrong) {
+using IsWrong = std::function<bool(const wire::InputStatus&)>;
+
+// Those of the input ports that somebody has open. Nothing where that cannot be seen: who may
+// change the model need not be allowed to observe.
+std::optional<std::vector<std::string>> open_ports(const std::string& verb,
+                                                   const std::string& instance,
+                                                   const IsWrong& is_wrong) {
   std::vector<std::string> names;
   try {
     for (const wire::InputStatus& port : fetch_status(verb, instance).inputs) {
       if (port.open && is_wrong(port)) names.push_back(port.name);
     }
   } catch (const wire::CallError&) {
-    return;  // who may change the model need not be allowed to observe
+    return {};
   }
-  if (!names.empty()) std::cout << "  " << what << ": " << rules::enumerate(names) << '\n';
+  return names;
+}
+
+void write_open(const std::string& what, const std::optional<std::vector<std::string>>& names) {
+  if (!names || names->empty()) return;
+  std::cout << "  " << what << ": " << rules::enumerate(*names) << '\n';
+}
+
+// That the model in force does not mention, or in a dry run will not.
+std::optional<std::vector<std::string>> unmentioned(const std::string& verb,
+                                                    const std::string& instance,
+                                                    const wire::ChangeReport& report,
+                                                    bool is_dry_run) {
+  if (!report.ok) return {};
+  if (!is_dry_run) {
+    if (report.generation.value_or(0) == 0) return std::vector<std::string>();
+    return open_ports(verb, instance,
+                      [](const wire::InputStatus& port) { return !port.mentioned; });
+  }
+  std::set<std::string> dropped;
+  for (const auto& model : report.models.value_or(std::vector<wire::ModelComparison>())) {
+    if (!model.in_force || !model.changes || !model.changes->diff) continue;
+    for (const wire::PortDifference& each : model.changes->diff->ports) {
+      if (!each.after.exists) dropped.insert(each.port);
+    }
+  }
+  if (dropped.empty()) return std::vector<std::string>();
+  return open_ports(verb, instance,
+                    [&](const wire::InputStatus& port) { return dropped.contains(port.name); });
 }
 
 void add_files(const wire::LoadedModelStatus& model, std::set<std::string>& files) {
@@ -110,8 +144,11 @@ wire::ChangeReport ask_for_change(const std::string& verb, const std::string& in
   wire::Call daemon(caller(verb, instance));
   const std::string text = wire::change_report_text(daemon.ask(question));
   wire::ChangeReport report = wire::read_change_report(text);
-  const nlohmann::json document = wire::parse_document(text);
+  nlohmann::json document = wire::parse_document(text);
   if (json) {
+    const bool is_dry_run = (question.flags & wire::kDryRun) != 0;
+    const auto ports = unmentioned(verb, instance, report, is_dry_run);
+    document["unmentioned"] = ports ? nlohmann::json(*ports) : nlohmann::json(nullptr);
     std::cout << wire::write_document(document);
     return report;
   }
@@ -126,18 +163,13 @@ wire::ChangeReport ask_for_change(const std::string& verb, const std::string& in
 }
 
 void write_dropped(const std::string& verb, const std::string& instance,
-                   const wire::ModelComparison& model) {
-  std::set<std::string> dropped;
-  if (model.changes && model.changes->diff) {
-    for (const wire::PortDifference& each : model.changes->diff->ports) {
-      if (!each.after.exists) dropped.insert(each.port);
-    }
+                   const wire::ChangeReport& report) {
+  for (const auto& model : report.models.value_or(std::vector<wire::ModelComparison>())) {
+    if (!model.in_force) continue;
+    write_open("open now, and no longer mentioned by the files of model " +
+                   rules::quote(shm::printable(model.name)) + ", so that no sample would arrive",
+               unmentioned(verb, instance, report, true));
   }
-  if (dropped.empty()) return;
-  write_open(verb, instance,
-             "open now, and no longer mentioned by the files of model " +
-                 rules::quote(shm::printable(model.name)) + ", so that no sample would arrive",
-             [&](const wire::InputStatus& port) { return dropped.contains(port.name); });
 }
 
 int change_model(const std::string& verb, const std::string& instance,
@@ -146,10 +178,8 @@ int change_model(const std::string& verb, const std::string& instance,
   if (!report.ok) return 1;
   if (!json) {
     write_in_force(report);
-    if (report.generation.value_or(0) != 0) {
-      write_open(verb, instance, "open, but not mentioned by this model, so that no sample arrives",
-                 [](const wire::InputStatus& port) { return !port.mentioned; });
-    }
+    write_open("open, but not mentioned by this model, so that no sample arrives",
+               unmentioned(verb, instance, report, false));
   }
   return 0;
 }

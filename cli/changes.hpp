@@ -9,15 +9,17 @@
 namespace arbiter::cli {
 
 // The daemon's report on the change, which may be a refusal. Writes the report to standard output
-// (`json`), or what was found in files, and why the change is refused, to standard error. Throws
-// wire::CallError where there is no daemon, or it does not allow it.
+// (`json`, with the open
+// ports that the model does not mention), or what was found in files, and why the change is
+// refused, to standard error. Throws wire::CallError where there is no daemon, or it does not allow
+// it.
 wire::ChangeReport ask_for_change(const std::string& verb, const std::string& instance,
                                   wire::Message question, bool json);
 
-// Of the input ports that the files of a dry run drop from that model, those that somebody has
-// open.
+// Of the input ports that the files of a dry run drop from the model in force, those that somebody
+// has open.
 void write_dropped(const std::string& verb, const std::string& instance,
-                   const wire::ModelComparison& model);
+                   const wire::ChangeReport& report);
 
 // Asks for it, and says, unless `json`: "model 5 is in force", what that changes, and which open
 // ports it does not mention. Gives the verb's exit code. Throws as ask_for_change().

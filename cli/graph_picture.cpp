@@ -15,6 +15,7 @@
 #include "cli/live.hpp"
 #include "cli/model_files.hpp"
 #include "cli/output_file.hpp"
+#include "cli/port_name.hpp"
 #include "cli/progress.hpp"
 #include "drawing/graphviz.hpp"
 #include "drawing/only_ports.hpp"
@@ -95,7 +96,7 @@ bool Picture::load(const rules::ModelTexts& texts, const std::string& in_force) 
   if (!is_good_) return false;
   if (!options_.ports.empty()) {
     const std::set<std::string> ports(options_.ports.begin(), options_.ports.end());
-    drawing::require_ports(model_.rules, ports);
+    for (const std::string& port : ports) require_port(model_.rules, port, "--port ");
     part_ = drawing::only_ports(model_, ports);
   }
   choose_view();

@@ -34,7 +34,7 @@ void say(const std::string& what) {
 
 // What other programs call a verb; empty: none.
 std::string_view verb_for(std::string_view word) {
-  constexpr std::array<std::pair<std::string_view, std::string_view>, 9> kMeant{{
+  constexpr std::array<std::pair<std::string_view, std::string_view>, 11> kMeant{{
       {"explain", "why"},
       {"validate", "check"},
       {"watch", "top"},
@@ -44,6 +44,8 @@ std::string_view verb_for(std::string_view word) {
       {"list", "status"},
       {"ls", "status"},
       {"info", "status"},
+      {"models", "switch"},
+      {"draw", "graph"},
   }};
   const auto* const found = std::find_if(kMeant.begin(), kMeant.end(),
                                          [&](const auto& each) { return each.first == word; });

@@ -10,6 +10,7 @@
 #include "cli/model_files.hpp"
 #include "cli/numbers.hpp"
 #include "cli/output_file.hpp"
+#include "cli/port_name.hpp"
 #include "cli/verbs.hpp"
 
 namespace arbiter::cli {
@@ -55,7 +56,8 @@ void add_graph(CLI::App& app, int& exit_code) {
   verb->add_option("--port", options->ports,
                    "Only what decides at this input port; may be given several times")
       ->type_name("PORT")
-      ->allow_extra_args(false);
+      ->allow_extra_args(false)
+      ->check(name_of_port());
   verb->add_option("--format", options->format,
                    std::string(kGraphFormats) +
                        "; without it by the ending of the file, svg where it has none")

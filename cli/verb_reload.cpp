@@ -42,9 +42,7 @@ int reload(const ReloadOptions& options) {
   if (options.json || !report.ok) return report.ok ? 0 : 1;
   const auto models = report.models.value_or(std::vector<wire::ModelComparison>());
   for (const auto& model : models) write_changes(model, models.size() == 1);
-  for (const auto& model : models) {
-    if (model.in_force) write_dropped("reload", options.instance, model);
-  }
+  write_dropped("reload", options.instance, report);
   if (report.policy && report.policy->differs) {
     std::cout << "the policy " << report.policy->file << " differs from the one in force: it has "
               << rules::counted(report.policy->rules, "rule") << '\n';

@@ -115,6 +115,7 @@ int simulate(const SimulateOptions& options) {
   if (is_why) {
     WhySimulated why(model->rules, simulation, {port_of(options.why), options.json});
     replay(events, [&](const auto& event) { why.step(event, std::cout); });
+    why.tell_repeats(std::cout);
     return 0;
   }
   rules::write_outcome_header(std::cout);

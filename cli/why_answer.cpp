@@ -11,8 +11,8 @@
 #include "cli/other_hosts.hpp"
 #include "cli/why_imports.hpp"
 #include "cli/why_report.hpp"
+#include "cli/why_source.hpp"
 #include "cli/why_summary.hpp"
-#include "command_line/shell_word.hpp"
 #include "rules/text/names.hpp"
 #include "watch/slow_publishers.hpp"
 
@@ -28,31 +28,6 @@ using watch::ModelInForce;
 constexpr std::size_t kMaxTold = 8;
 // Where there is something to say of more than kMaxTold: of so many it is said one by one.
 constexpr std::size_t kMaxTakenApart = 3;
-
-// Whoever asks about a source is told at which ports it matters.
-void refuse_source(const std::string& name, watch::Instance& instance) {
-  if (instance.find_port(name)) return;
-  const wire::Status status = instance.status();
-  if (status.find_source(name) == nullptr || status.find_input(name) != nullptr) return;
-  const auto has_it = [&](const auto& each) { return each.source == name; };
-  std::vector<std::string> connected, read;
-  for (const wire::InputStatus& input : status.inputs) {
-    if (std::any_of(input.connections.begin(), input.connections.end(), has_it)) {
-      connected.push_back(input.name);
-    } else if (std::any_of(input.senses.begin(), input.senses.end(), has_it)) {
-      read.push_back(input.name);
-    }
-  }
-  std::string text = name + " is an output port";
-  if (connected.empty() && read.empty()) {
-    throw watch::WatchError(text + ", of which the model in force reads and selects nothing");
-  }
-  if (!connected.empty()) text += ", connected to " + rules::enumerate(connected);
-  if (!read.empty()) text += ", read at " + rules::enumerate(read);
-  throw watch::WatchError(text + "; give the input port first: arbiter why " +
-                          command_line::shell_word((connected.empty() ? read : connected).front()) +
-                          ' ' + command_line::shell_word(name));
-}
 
 bool is_open_in(const wire::Status& status, const std::string& port) {
   const wire::InputStatus* const input = status.find_input(port);
@@ -255,7 +230,7 @@ void WhyAnswer::write_json() const {
 void write_why(std::ostream& out, const WhyOptions& options,
                const std::shared_ptr<watch::Instance>& instance, const watch::KeptPicture* kept,
                const wire::HostsDocument* hosts, std::shared_ptr<watch::ModelLoader> models) {
-  refuse_source(options.port, *instance);
+  require_no_source(options, *instance);
   watch::Port port(instance, options.port, std::move(models));
   for (;;) {
     Look look = kept == nullptr ? port.look() : port.look_back(*kept);

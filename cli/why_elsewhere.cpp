@@ -13,6 +13,7 @@
 #include "cli/live.hpp"
 #include "cli/other_hosts.hpp"
 #include "cli/why_report.hpp"
+#include "cli/why_source.hpp"
 #include "rules/explain/explain.hpp"
 #include "rules/model/load.hpp"
 #include "rules/text/names.hpp"
@@ -123,13 +124,15 @@ std::vector<std::string> causes_of(const rules::PortExplanation& explanation,
   return {};
 }
 
-const wire::InputStatus& require_input(const Elsewhere& there, const std::string& port,
+const wire::InputStatus& require_input(const Elsewhere& there, const WhyOptions& options,
                                        const std::string& host) {
+  const std::string& port = options.port;
   if (const wire::InputStatus* const input = there.status.find_input(port)) return *input;
+  const std::string none = "host " + host + " has no input port " + port;
+  require_no_source(options, there.status, none);
   std::vector<std::string_view> known;
   for (const wire::InputStatus& each : there.status.inputs) known.push_back(each.name);
-  throw watch::WatchError("host " + host + " has no input port " + port +
-                          rules::advise(port, known, "`arbiter status --all` lists them"));
+  throw watch::WatchError(none + rules::advise(port, known, "`arbiter status --all` lists them"));
 }
 
 // The answer may be about one source alone.
@@ -295,7 +298,7 @@ class FollowerElsewhere {
       : options_(options), host_(std::move(host)) {
     Elsewhere there;
     there.status = status();
-    last_ = {require_input(there, options_.port, host_), there.status.model.generation};
+    last_ = {require_input(there, options_, host_), there.status.model.generation};
     write(last_, nullptr);
     if (options_.json) return;
     there.hosts = hosts_if_linked(options_.instance).value_or(wire::HostsDocument{});
@@ -376,7 +379,7 @@ int follow_elsewhere(const WhyOptions& options, const std::string& host) {
 
 void write_why_elsewhere(std::ostream& out, const WhyOptions& options, const std::string& host) {
   const Elsewhere there = ask(options.instance, host);
-  const wire::InputStatus input = only(require_input(there, options.port, host), options.source);
+  const wire::InputStatus input = only(require_input(there, options, host), options.source);
   if (options.json) {
     out << wire::write_document(json_of(there, input, host));
   } else {

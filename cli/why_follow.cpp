@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <iostream>
+#include <memory>
 #include <utility>
 
 #include <nlohmann/json.hpp>
@@ -10,6 +11,7 @@
 #include "cli/live.hpp"
 #include "cli/model_report.hpp"
 #include "cli/why_report.hpp"
+#include "cli/why_source.hpp"
 #include "rules/explain/change.hpp"
 #include "shm/clock.hpp"
 
@@ -24,7 +26,7 @@ class Follower {
   Follower(const WhyOptions& options, shm::FileDescriptor interrupts)
       : options_(options),
         interrupts_(std::move(interrupts)),
-        port_(follow_instance("why", options.instance), options.port),
+        port_(instance_for(options), options.port),
         started_(shm::monotonic_now()),
         last_(port_.look()) {
     static_cast<void>(port_.explain(last_));  // fetches the model while there is a daemon
@@ -51,6 +53,12 @@ class Follower {
   }
 
  private:
+  static std::shared_ptr<watch::Instance> instance_for(const WhyOptions& options) {
+    auto instance = follow_instance("why", options.instance);
+    require_no_source(options, *instance);
+    return instance;
+  }
+
   [[nodiscard]] std::string name_of(const Look& look) const {
     if (look.generation() == 0) return "no model";
     if (!look.is_mentioned) return "not mentioned";  // nothing comes; else all comes:

@@ -1,25 +1,14 @@
 // arbiter why --follow: each change of a port's winner, with its cause, as it comes.
 #pragma once
 
-#include <cstdint>
 #include <string>
 #include <vector>
 
+#include "cli/why_options.hpp"
 #include "shm/ids.hpp"
 #include "watch/port.hpp"
 
 namespace arbiter::cli {
-
-struct WhyOptions {
-  std::string port;
-  std::string source;
-  std::string instance;
-  std::string host;  // empty: the one that has the port open
-  bool follow = false;
-  bool all = false;
-  bool json = false;
-  std::uint64_t count = 0;  // of changes; 0: until interrupted
-};
 
 // Returns the exit code. Throws as watch::Port does.
 int follow_winners(const WhyOptions& options);

@@ -1,5 +1,6 @@
 #include "cli/why_recorded.hpp"
 
+#include <algorithm>
 #include <iostream>
 #include <iterator>
 #include <map>
@@ -9,6 +10,7 @@
 #include <vector>
 
 #include "cli/model_files.hpp"
+#include "cli/port_name.hpp"
 #include "cli/recording_compile.hpp"
 #include "cli/recording_times.hpp"
 #include "cli/why_simulated.hpp"
@@ -77,6 +79,11 @@ class Explaining {
     has_told_ = has_told_ || tenure_->why.has_told();
   }
 
+  // Throws std::runtime_error where no model had the port that is asked about.
+  void require_port() const {
+    if (has_port_ || without_port_ == nullptr) return;
+    cli::require_port(without_port_->rules, options_.port, WhySimulated::kWhyOption);
+  }
   // Whether there was anything to tell.
   [[nodiscard]] bool has_told() const { return has_told_; }
 
@@ -84,6 +91,7 @@ class Explaining {
   void put_in_force(const evidence::ModelChange& change, shm::Nanoseconds time) {
     if (tenure_ != nullptr) {
       tenure_->why.run_out_until(time, std::cout);
+      tenure_->why.tell_repeats(std::cout);
       has_told_ = has_told_ || tenure_->why.has_told();
     }
     if (other_ != nullptr && tenure_ != nullptr) return;
@@ -104,6 +112,15 @@ class Explaining {
                   << " comes into force\n";
       }
     }
+    // Another model of the recording may have it.
+    if (!options_.port.empty() && !has_port(*model)) {
+      without_port_ = std::move(model);
+      if (other_ != nullptr) return;
+      std::cerr << "arbiter: model " << change.generation << " has no input port " << options_.port
+                << ": what it decided is left out\n";
+      return;
+    }
+    has_port_ = true;
     tenure_ = std::make_unique<Tenure>(std::move(model), options_);
     rules::Simulation& simulation = tenure_->simulation;
     for (const auto& [source, word] : words_) {
@@ -111,6 +128,12 @@ class Explaining {
     }
     simulation.advance_to(time);
     tenure_->why.begin(std::cout);
+  }
+
+  [[nodiscard]] bool has_port(const Model& model) const {
+    const auto& ports = model.compiled.ports;
+    return std::any_of(ports.begin(), ports.end(),
+                       [&](const auto& each) { return each.port == options_.port; });
   }
 
   void take(const Run& run, const Cue& cue) {
@@ -138,6 +161,8 @@ class Explaining {
   std::unique_ptr<Tenure> tenure_;
   bool is_first_ = true;  // no model of this run has come into force
   bool has_told_ = false;
+  std::shared_ptr<const Model> without_port_;  // one that does not have the port asked about
+  bool has_port_ = false;                      // another one does
 };
 
 }  // namespace
@@ -171,6 +196,7 @@ int explain_recording(const SimulateRecordingOptions& options, const std::string
   }
   Explaining explaining(std::move(other), options.effort, std::move(told));
   for (const Run& run : recorded.runs) explaining.explain(run);
+  explaining.require_port();
   if (!options.at.empty() && !options.json && !explaining.has_told()) {
     std::cout << "nobody won at " << shm::printable(options.at) << ", and nothing happened\n";
   }

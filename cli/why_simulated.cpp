@@ -5,6 +5,7 @@
 #include <stdexcept>
 #include <string_view>
 
+#include "cli/port_name.hpp"
 #include "rules/explain/change.hpp"
 #include "rules/explain/tenure.hpp"
 #include "rules/text/names.hpp"
@@ -34,12 +35,7 @@ WhySimulated::WhySimulated(const rules::RuleSet& rules, rules::Simulation& simul
       options_(std::move(options)),
       winners_(simulation.port_names().size(), shm::kNone),
       was_active_(simulation.source_count(), false) {
-  const auto& ports = simulation.port_names();
-  if (options_.port.empty()) return;
-  if (std::find(ports.begin(), ports.end(), options_.port) != ports.end()) return;
-  const std::vector<std::string_view> known(ports.begin(), ports.end());
-  throw std::runtime_error("the model has no input port " + options_.port +
-                           rules::advise(options_.port, known, "`arbiter rules` shows its ports"));
+  if (!options_.port.empty()) require_port(rules, options_.port, kWhyOption);
 }
 
 void WhySimulated::step(const rules::TraceEvent& event, std::ostream& out) {
@@ -65,6 +61,7 @@ void WhySimulated::run_out_until(shm::Nanoseconds time, std::ostream& out) {
 
 void WhySimulated::end(shm::Nanoseconds time, std::ostream& out) {
   run_out_until(time, out);
+  tell_repeats(out);
   if (time >= options_.from) tell_held(out);
 }
 
@@ -224,6 +221,7 @@ void WhySimulated::tell_change(shm::PortId port, shm::SourceId before, shm::Sour
                                std::ostream& out) {
   const std::string& name = simulation_.port_name(port);
   if (!options_.port.empty() && options_.port != name) return;
+  tell_repeats_at(port, out);
   if (simulation_.now() >= options_.to) return;
   const Sources sources = sources_at(port);
   const auto causes = rules::causes_of_change(
@@ -261,24 +259,64 @@ void WhySimulated::tell_change(shm::PortId port, shm::SourceId before, shm::Sour
 void WhySimulated::tell_discarded(const rules::OutcomeRow& row, std::ostream& out) {
   if (!options_.port.empty() && options_.port != row.port) return;
   if (row.event.at < options_.from || row.event.at >= options_.to) return;
-  tell_held(out);
-  has_told_ = true;
   const auto& ports = simulation_.port_names();
   const auto port = static_cast<shm::PortId>(
       std::lower_bound(ports.begin(), ports.end(), row.port) - ports.begin());
   const Sources sources = sources_at(port);
   const auto connection = explain(port, row.event.source, sources);
   if (!connection) return;  // the port only reads it
+  tell_held(out);
+  has_told_ = true;
   if (options_.json) {
     const json event{{"t_ns", row.event.at},
                      {"port", row.port},
                      {"event", "discarded"},
                      {"connection", connection_json(*connection, sources)}};
     out << line_of(event, row.event.at);
-  } else {
+  } else if (!count_repeat(port, *connection, out)) {
     out << time_of_now() << "  " << row.port << "  " << connection->source
         << " discarded: " << first_cause(*connection, sources) << '\n';
   }
+}
+
+bool WhySimulated::count_repeat(shm::PortId port, const rules::ConnectionExplanation& connection,
+                                std::ostream& out) {
+  std::string reason = first_cause(connection, Sources());  // without times
+  const auto literals = connection.reason();
+  for (const rules::Literal& each : literals.value_or(std::vector<rules::Literal>())) {
+    reason += ' ' + each.source + (each.active ? '+' : '-');
+  }
+  const auto [known, is_new] = repeats_.try_emplace({port, connection.source});
+  Repeats& repeats = known->second;
+  if (!is_new && repeats.reason == reason) {
+    ++repeats.more;
+    repeats.last = simulation_.now();
+    return true;
+  }
+  tell_repeats(known->first, repeats, out);
+  repeats = {std::move(reason)};
+  return false;
+}
+
+void WhySimulated::tell_repeats(const Connection& connection, const Repeats& repeats,
+                                std::ostream& out) {
+  if (repeats.more == 0) return;
+  out << text_of(std::min(simulation_.now(), options_.to)) << "  "
+      << simulation_.port_name(connection.first) << "  " << connection.second << " was discarded "
+      << rules::counted(repeats.more, "more time") << " for that reason, until "
+      << text_of(repeats.last) << '\n';
+}
+
+void WhySimulated::tell_repeats_at(shm::PortId port, std::ostream& out) {
+  for (auto at = repeats_.lower_bound({port, ""}); at != repeats_.end() && at->first.first == port;
+       at = repeats_.erase(at)) {
+    tell_repeats(at->first, at->second, out);
+  }
+}
+
+void WhySimulated::tell_repeats(std::ostream& out) {
+  for (const auto& [connection, repeats] : repeats_) tell_repeats(connection, repeats, out);
+  repeats_.clear();
 }
 
 }  // namespace arbiter::cli

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <optional>
 #include <ostream>
 #include <set>
@@ -19,11 +20,15 @@
 
 namespace arbiter::cli {
 
-// Two kinds of lines, in order of time; activity that runs out between two events has its own.
+// Three kinds of lines, in order of time; activity that runs out between two events has its own.
 //   0.100 s  /Gaze/pos:i  /RandomLook/pos:o -> /Face/pos:o  because /Face/pos:o became active; …
 //   0.150 s  /Gaze/pos:i  /RandomLook/pos:o discarded: inhibited by …
+//   0.700 s  /Gaze/pos:i  /RandomLook/pos:o was discarded 11 more times for that reason, until …
+// JSON has each of the discarded ones.
 class WhySimulated {
  public:
+  static constexpr const char* kWhyOption = "--why=";  // before the port
+
   struct Options {
     std::string port;  // empty: all
     bool json = false;
@@ -55,7 +60,9 @@ class WhySimulated {
             shm::Nanoseconds to, std::ostream& out);
   // Tells what ends by itself until then.
   void run_out_until(shm::Nanoseconds time, std::ostream& out);
-  // The same, where nothing follows.
+  // What was discarded again, and not told yet: where nothing follows.
+  void tell_repeats(std::ostream& out);
+  // The same, and what ends by itself until then.
   void end(shm::Nanoseconds time, std::ostream& out);
   // Whether it has told anything yet.
   [[nodiscard]] bool has_told() const { return has_told_; }
@@ -66,6 +73,14 @@ class WhySimulated {
     shm::PortId port = shm::kNone;  // whose winner it tells
     std::string line;
   };
+
+  // Of one connection, one after the other and for the same reason.
+  struct Repeats {
+    std::string reason;
+    std::uint64_t more = 0;  // than the one that was told
+    shm::Nanoseconds last = 0;
+  };
+  using Connection = std::pair<shm::PortId, std::string>;  // with its source
 
   void schedule(shm::SourceId source);
   [[nodiscard]] std::string text_of(shm::Nanoseconds time) const;
@@ -79,6 +94,12 @@ class WhySimulated {
   void tell_changes(std::ostream& out);
   void tell_change(shm::PortId port, shm::SourceId before, shm::SourceId now, std::ostream& out);
   void tell_discarded(const rules::OutcomeRow& row, std::ostream& out);
+  // Whether it is one more for the same reason, which is counted. What was counted for another one
+  // is told.
+  bool count_repeat(shm::PortId port, const rules::ConnectionExplanation& connection,
+                    std::ostream& out);
+  void tell_repeats(const Connection& connection, const Repeats& repeats, std::ostream& out);
+  void tell_repeats_at(shm::PortId port, std::ostream& out);
   [[nodiscard]] Sources sources_at(shm::PortId port) const;
   [[nodiscard]] std::string name_of(shm::SourceId winner) const;
   [[nodiscard]] std::optional<rules::ConnectionExplanation> explain(shm::PortId port,
@@ -95,6 +116,7 @@ class WhySimulated {
   std::vector<bool> was_active_;                               // by source, when last told
   std::set<std::pair<shm::Nanoseconds, shm::SourceId>> ends_;  // of activity, as it was scheduled
   std::vector<Held> held_;
+  std::map<Connection, Repeats> repeats_;
   bool has_told_ = false;
 };
 

@@ -168,6 +168,10 @@ inline std::string meant(const CLI::App& verb, const std::vector<std::string>& w
   std::string all;
   for (const std::string& word : words) {
     all += (all.empty() ? "" : " ") + word;
+    if (word.ends_with(".xml") && has_option(verb, "--application-before"))
+      return "; the files of one model are joined by commas, as in a.xml,b.xml";
+    if (word.ends_with(".xml") && verb.get_name() == "reload")
+      return "; it reads the files again that arbiterd was started with";
     if (word.ends_with(".mcap") && may_be("--recording")) return as("--recording", word);
     if (word.ends_with(".mcap") && missing == "--output") return as(missing, word);
     const bool has_rest = !takes_others || words.size() > 1;

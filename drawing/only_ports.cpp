@@ -1,12 +1,9 @@
 #include "drawing/only_ports.hpp"
 
 #include <algorithm>
-#include <stdexcept>
-#include <string_view>
 #include <vector>
 
 #include "rules/model/hierarchy.hpp"
-#include "rules/text/names.hpp"
 
 namespace arbiter::drawing {
 namespace {
@@ -101,18 +98,6 @@ std::set<std::string> sources_of(const rules::RuleSet& rules) {
 }
 
 }  // namespace
-
-void require_ports(const rules::RuleSet& rules, const std::set<std::string>& ports) {
-  std::set<std::string_view> known;
-  for (const rules::PortRules& port : rules.ports) known.insert(port.port);
-  for (const rules::Connection& connection : rules.other_connections) known.insert(connection.port);
-  for (const std::string& port : ports) {
-    if (known.contains(port)) continue;
-    throw std::runtime_error(
-        "the model has no input port " + port +
-        rules::advise(port, {known.begin(), known.end()}, "`arbiter rules` shows its ports"));
-  }
-}
 
 rules::LoadedModel only_ports(const rules::LoadedModel& model, const std::set<std::string>& ports) {
   rules::LoadedModel part = model;

@@ -8,10 +8,6 @@
 
 namespace arbiter::drawing {
 
-// Of an input port that the model does not have, throws std::runtime_error, which names similar
-// ones.
-void require_ports(const rules::RuleSet& rules, const std::set<std::string>& ports);
-
 // What decides at these input ports: the behaviours that configure one of them and those whose
 // activity silences such a one there, with the boxes around them; of connections, those to them.
 rules::LoadedModel only_ports(const rules::LoadedModel& model, const std::set<std::string>& ports);

@@ -16,14 +16,7 @@ constexpr std::size_t kWidth = 100;
 constexpr const char* kOldestPress = "86400s";
 constexpr const char* kDeclaration = "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n";
 
-std::string escape(std::string_view text) {
-  std::string result;
-  for (const char c : text) {
-    const auto reference = rules::reference_for(c);
-    result += reference.empty() ? std::string(1, c) : std::string(reference);
-  }
-  return result;
-}
+using rules::escape_xml;
 
 // Two hyphens would end a comment, and so would one before its end.
 std::string in_comment(std::string_view text) {
@@ -78,8 +71,8 @@ class ModelWriter {
   std::string write() {
     text_ = kDeclaration;
     write_heading();
-    text_ +=
-        "<behaviors>\n\n  <define name=\"base\"> " + escape(plan_.output_port) + " </define>\n\n";
+    text_ += "<behaviors>\n\n  <define name=\"base\"> " + escape_xml(plan_.output_port) +
+             " </define>\n\n";
     write_sources();
     for (std::size_t i = 0; i < plan_.commands.size(); ++i) write_command(i);
     return text_ + "</behaviors>\n";
@@ -103,8 +96,8 @@ class ModelWriter {
   }
 
   void write_source(const std::string& port, shm::Nanoseconds timeout) {
-    text_ +=
-        "  <source port=\"" + escape(port) + "\" timeout=\"" + rules::to_string(timeout) + "\"/>\n";
+    text_ += "  <source port=\"" + escape_xml(port) + "\" timeout=\"" + rules::to_string(timeout) +
+             "\"/>\n";
   }
 
   void write_sources() {
@@ -132,15 +125,15 @@ class ModelWriter {
     text_ += comment(command.topic + ", " + command.rank + ", " + command.silence + ": " +
                          line_of(command.where),
                      "  ");
-    text_ += "  <behavior name=\"" + escape(command.name) + "\">\n";
-    text_ += "    <config at=\"${base}\">" + escape(command.port) + "</config>\n";
+    text_ += "  <behavior name=\"" + escape_xml(command.name) + "\">\n";
+    text_ += "    <config at=\"${base}\">" + escape_xml(command.port) + "</config>\n";
     for (const std::size_t index : command.locks) write_lock(plan_.locks[index]);
     write_inhibition(i + 1);
     text_ += "  </behavior>\n\n";
   }
 
   void write_lock(const Lock& lock) {
-    text_ += "    <condition>" + escape((lock.has_heartbeat ? "" : "not ") + lock.port) +
+    text_ += "    <condition>" + escape_xml((lock.has_heartbeat ? "" : "not ") + lock.port) +
              "</condition>  <!-- " +
              in_comment(lock.name + ", " + lock.rank + ": " + line_of(lock.where)) + " -->\n";
   }
@@ -148,7 +141,7 @@ class ModelWriter {
   void write_inhibition(std::size_t first) {
     std::string names;
     for (std::size_t i = first; i < plan_.commands.size(); ++i) {
-      names += (names.empty() ? "" : ", ") + escape(plan_.commands[i].name);
+      names += (names.empty() ? "" : ", ") + escape_xml(plan_.commands[i].name);
     }
     if (names.empty()) return;
     const std::string indent(6, ' ');
@@ -164,7 +157,7 @@ class ModelWriter {
 };
 
 std::string attribute(const std::string& name, const std::string& value) {
-  return " " + name + "=\"" + escape(value) + "\"";
+  return " " + name + "=\"" + escape_xml(value) + "\"";
 }
 
 }  // namespace

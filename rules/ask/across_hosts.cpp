@@ -4,6 +4,7 @@
 #include <set>
 #include <utility>
 
+#include "rules/ask/dependence.hpp"
 #include "rules/ask/instants.hpp"
 #include "rules/ask/negation_places.hpp"
 #include "rules/model/polarity.hpp"
@@ -55,18 +56,31 @@ struct RemoteUse {
   std::vector<std::string> required_at;  // ports, as below
   std::vector<std::string> negated_at;
   std::vector<std::string> freed;  // "/Rest/pos:o at /Arm/pos:i": what waits for its silence
-  Location negation;               // that lets the first of these wait
+  // The first of these.
+  const PortRules* port = nullptr;
+  const ConnectionRule* rule = nullptr;
 };
 
 class AcrossHosts {
  public:
-  AcrossHosts(const RuleSet& rules, const SourceUses& uses, const HostPlaces& places,
-              Diagnostics& diagnostics)
-      : rules_(rules), uses_(uses), places_(places), negations_(rules), diagnostics_(diagnostics) {}
+  AcrossHosts(const RuleSet& rules, const CompiledModel& model, const SourceUses& uses,
+              const HostPlaces& places, Diagnostics& diagnostics, Budget& budget)
+      : rules_(rules),
+        uses_(uses),
+        places_(places),
+        negations_(rules, budget),
+        diagnostics_(diagnostics),
+        budget_(budget) {
+    for (const CompiledPort& port : model.ports) compiled_.emplace(port.port, &port);
+  }
 
   void find() {
     for (const PortRules& port : rules_.ports) {
-      if (!places_.of_port(port.port).empty()) look_at(port);
+      const auto compiled = compiled_.find(port.port);
+      if (compiled == compiled_.end() || places_.of_port(port.port).empty()) continue;
+      const Budget::Part part(budget_, budget_.left() / 4);
+      Dependence dependence(*compiled->second, budget_);
+      look_at(port, dependence);
     }
     for (const auto& [source, use] : uses_) {
       note_crossing(source, use);
@@ -80,20 +94,29 @@ class AcrossHosts {
   }
 
  private:
-  void look_at(const PortRules& port) {
+  // Nearly all sources are asked for as it is written. Of these the diagrams are asked.
+  void look_at(const PortRules& port, Dependence& dependence) {
     Polarity before;  // with conflict="first", what keeps the next rule from winning
     std::set<std::string> required, negated;
+    const auto is_asked = [&](const ConnectionRule& rule, const std::string& source, bool active) {
+      return places_.are_apart(source, port.port) && dependence.needs(rule.source, source, active);
+    };
     for (const ConnectionRule& rule : port.rules) {
       Polarity polarity;
       polarity.visit(*rule.condition);
       polarity.add(rule.source, true);
-      required.insert(polarity.required().begin(), polarity.required().end());
+      for (const std::string& source : polarity.required()) {
+        if (!required.contains(source) && is_asked(rule, source, true)) required.insert(source);
+      }
       std::set<std::string> silent = polarity.negated();
       silent.insert(before.negated().begin(), before.negated().end());
       for (const std::string& source : silent) {
-        if (source == rule.source || !places_.are_apart(source, port.port)) continue;
+        if (source == rule.source || !is_asked(rule, source, false)) continue;
         RemoteUse& remote = remote_[source];
-        if (remote.freed.empty()) remote.negation = negations_.find(source, port, rule);
+        if (remote.freed.empty()) {
+          remote.port = &port;
+          remote.rule = &rule;
+        }
         remote.freed.push_back(rule.source + " at " + port.port);
         negated.insert(source);
       }
@@ -101,9 +124,7 @@ class AcrossHosts {
       before.visit(*rule.condition, false);
       before.add(rule.source, false);
     }
-    for (const std::string& source : required) {
-      if (places_.are_apart(source, port.port)) remote_[source].required_at.push_back(port.port);
-    }
+    for (const std::string& source : required) remote_[source].required_at.push_back(port.port);
     for (const std::string& source : negated) remote_[source].negated_at.push_back(port.port);
   }
 
@@ -151,7 +172,7 @@ class AcrossHosts {
             ? ". What begins or ends while the network is cut is not known there: "
             : ". A cut network counts as its silence there: after " + to_string(timeout) + ", ";
     diagnostics_.warning(
-        "negated-across-hosts", remote.negation,
+        "negated-across-hosts", negations_.find(source, *remote.port, *remote.rule),
         source + " is on " + enumerate(places_.of_source(source)) + ", and a rule at " +
             at_hosts(remote.negated_at, places_) + " requires it to be inactive" + what_happens +
             first_of(remote.freed) + " may win although " + source +
@@ -180,6 +201,8 @@ class AcrossHosts {
   const HostPlaces& places_;
   NegationPlaces negations_;
   Diagnostics& diagnostics_;
+  Budget& budget_;
+  std::map<std::string, const CompiledPort*> compiled_;
   std::map<std::string, RemoteUse> remote_;
 };
 
@@ -201,7 +224,7 @@ void warn_of_statements(const std::vector<Verdict>& verdicts, const HostPlaces& 
 void find_across_hosts(const RuleSet& rules, const CompiledModel& model, const SourceUses& uses,
                        const HostPlaces& places, const std::vector<Verdict>& verdicts,
                        Diagnostics& diagnostics, Budget& budget) {
-  AcrossHosts(rules, uses, places, diagnostics).find();
+  AcrossHosts(rules, model, uses, places, diagnostics, budget).find();
   warn_of_statements(verdicts, places, diagnostics);
   find_instants(rules, model, places, diagnostics, budget);
 }

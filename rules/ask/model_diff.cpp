@@ -264,6 +264,18 @@ std::vector<std::string> only_in(const CompiledPort& port, const CompiledPort* o
   return {sources.begin(), sources.end()};
 }
 
+// Sources that are neither read nor connected in the other.
+std::vector<std::string> read_only_in(const CompiledPort& port, const CompiledPort& other) {
+  std::vector<std::string> sources;
+  for (const std::string& source : port.reads) {
+    if (find_rule(port, source) != nullptr || find_rule(other, source) != nullptr) continue;
+    if (!std::binary_search(other.reads.begin(), other.reads.end(), source)) {
+      sources.push_back(source);
+    }
+  }
+  return sources;
+}
+
 // All but who wins.
 PortDiff port_diff(const std::string& port, const CompiledPort* before, const CompiledPort* after) {
   PortDiff result;
@@ -276,6 +288,10 @@ PortDiff port_diff(const std::string& port, const CompiledPort* before, const Co
   result.first_wins_after = after != nullptr && after->first_wins;
   if (before != nullptr) result.connections_before = only_in(*before, after);
   if (after != nullptr) result.connections_after = only_in(*after, before);
+  if (before != nullptr && after != nullptr) {
+    result.reads_before = read_only_in(*before, *after);
+    result.reads_after = read_only_in(*after, *before);
+  }
   return result;
 }
 

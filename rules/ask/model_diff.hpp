@@ -36,6 +36,8 @@ struct ModelDiff {
     bool first_wins_before = false, first_wins_after = false;  // conflict="first"
     std::vector<std::string> connections_before;  // sources connected in that model only
     std::vector<std::string> connections_after;
+    std::vector<std::string> reads_before;  // sources that rules read in that model only; a port
+    std::vector<std::string> reads_after;   // of both, where they are not connected
 
     // Of a port that both arbitrate.
     std::size_t sources = 0;      // connected or read there, in either model

@@ -64,12 +64,13 @@ void write_port(std::ostream& out, const PortDiff& port) {
     out << "  is arbitrated only " << (port.arbitrated_before ? "before" : "after")
         << ": without rules everything is delivered\n";
   }
-  if (!port.connections_before.empty()) {
-    out << "  connected only before: " << comma_list(port.connections_before) << '\n';
-  }
-  if (!port.connections_after.empty()) {
-    out << "  connected only after: " << comma_list(port.connections_after) << '\n';
-  }
+  const auto tell_only = [&](const char* what, const std::vector<std::string>& sources) {
+    if (!sources.empty()) out << "  " << what << ": " << comma_list(sources) << '\n';
+  };
+  tell_only("connected only before", port.connections_before);
+  tell_only("connected only after", port.connections_after);
+  tell_only("read only before", port.reads_before);
+  tell_only("read only after", port.reads_after);
   if (port.first_wins_before != port.first_wins_after) {
     out << "  conflict=\"first\" only " << (port.first_wins_before ? "before" : "after") << '\n';
   }
@@ -150,19 +151,21 @@ void write_json(std::ostream& out, const ModelDiff& diff) {
                          {"example", std::move(example)}});
     }
     const auto side = [](bool exists, bool arbitrated, bool first_wins,
-                         const std::vector<std::string>& connections) {
+                         const std::vector<std::string>& connections,
+                         const std::vector<std::string>& reads) {
       return Json{{"exists", exists},
                   {"arbitrated", arbitrated},
                   {"conflict", first_wins ? "first" : "error"},
-                  {"only_here", connections}};
+                  {"only_here", connections},
+                  {"read_only_here", reads}};
     };
     ports.push_back(
         {{"port", port.port},
          {"differs", port.differs()},
          {"before", side(port.exists_before, port.arbitrated_before, port.first_wins_before,
-                         port.connections_before)},
+                         port.connections_before, port.reads_before)},
          {"after", side(port.exists_after, port.arbitrated_after, port.first_wins_after,
-                        port.connections_after)},
+                        port.connections_after, port.reads_after)},
          {"sources", port.sources},
          {"states", port.open.empty() && port.is_counted ? Json(port.states) : Json(nullptr)},
          {"of", port.of},

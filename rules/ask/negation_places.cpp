@@ -1,10 +1,14 @@
 #include "rules/ask/negation_places.hpp"
 
+#include <set>
+
 #include "rules/model/polarity.hpp"
+#include "rules/prove/rule_builder.hpp"
 
 namespace arbiter::rules {
 
-NegationPlaces::NegationPlaces(const RuleSet& rules) : rules_(rules), expansion_(rules.sources) {
+NegationPlaces::NegationPlaces(const RuleSet& rules, Budget& budget)
+    : rules_(rules), budget_(budget), expansion_(rules.sources) {
   if (rules.provenance == nullptr) return;
   const Model& model = rules.provenance->model;
   for (const Select& select : model.selects) {
@@ -66,10 +70,38 @@ Location NegationPlaces::place_in_behaviour(const std::string& source, Asked ask
 }
 
 bool NegationPlaces::asks(const ExpressionPtr& condition, const std::string& source, Asked asked) {
+  const ExpressionPtr expanded = expansion_.expand(condition);
   Polarity polarity;
-  polarity.visit(*expansion_.expand(condition));
-  const auto& names = asked == Asked::kActive ? polarity.required() : polarity.negated();
-  return names.contains(source);
+  polarity.visit(*expanded);
+  const bool is_active = asked == Asked::kActive;
+  const auto& names = is_active ? polarity.required() : polarity.negated();
+  const auto& others = is_active ? polarity.negated() : polarity.required();
+  if (!names.contains(source)) return false;
+  // One that is written both ways may come to nothing, as in "/a or not /a".
+  return !others.contains(source) || depends(expanded, source, asked);
+}
+
+bool NegationPlaces::depends(const ExpressionPtr& condition, const std::string& source,
+                             Asked asked) {
+  try {
+    DiagramBuilder builder(budget_, DiagramBuilder::kVariables, false);
+    RuleBuilder rules(builder);
+    std::set<std::string> written;
+    rules.mention_all(*condition, written);
+    if (written.size() >= shm::kMaxSourcesPerPort) return true;
+    const std::string nobody;  // as the connection's own source, which is of no interest
+    rules.mention(nobody);
+    const Diagram holds = rules.rule({nobody, condition, {}, {}});
+    const Diagram active = builder.when(holds, rules.variable(source));
+    const Diagram inactive = builder.when_not(holds, rules.variable(source));
+    const bool is_active = asked == Asked::kActive;
+    return !builder
+                .combine(Connective::kAndNot, is_active ? active : inactive,
+                         is_active ? inactive : active)
+                .is_false();
+  } catch (const DiagramLimit&) {
+    return true;
+  }
 }
 
 bool NegationPlaces::speaks(const std::string& source, const std::string& port,

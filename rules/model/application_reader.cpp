@@ -1,10 +1,12 @@
 #include "rules/model/application_reader.hpp"
 
+#include <algorithm>
 #include <map>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
+#include <vector>
 
 #include "rules/model/element_reader.hpp"
 #include "rules/text/names.hpp"
@@ -46,15 +48,57 @@ class ApplicationReader {
       diagnostics_.error("not-an-application", locate(file_, root),
                          "the root of an application file is <application>, not <" +
                              std::string(root.text.substr(0, 80)) +
-                             ">; give a model as a model, not as the application");
+                             (misspelt_for(root.text, {"application"})
+                                  ? ">; correct it"
+                                  : ">; give a model as a model, not as the application"));
       return false;
     }
     bool fine = true;
     for (const XmlNode& element : Elements(root.first_child)) {
       if (element.text == "connection") fine = read_connection(element) && fine;
       if (element.text == "module") read_module(element);
+      warn_if_misspelt(element, {"connection", "module", "arbitration"});
     }
     return fine;
+  }
+
+  // YARP has elements that are not ours; nearly one of ours is most likely that one, and all that
+  // it holds would be missing without a word.
+  void warn_if_misspelt(const XmlNode& element, const std::vector<std::string_view>& ours) {
+    const auto meant = misspelt_for(element.text, ours);
+    if (!meant) return;
+    const std::string tag = '<' + std::string(element.text) + '>';
+    diagnostics_.warning("misspelt-element", locate(file_, element),
+                         tag +
+                             " is nothing that Arbiter knows in an application, and is passed "
+                             "over with all that it holds; did you mean <" +
+                             *meant + ">?");
+  }
+
+  static std::optional<std::string> misspelt_for(std::string_view tag,
+                                                 const std::vector<std::string_view>& ours) {
+    if (std::find(ours.begin(), ours.end(), tag) != ours.end()) return {};
+    auto meant = find_similar(tag, ours);
+    // Of short words, with one letter for another, there are too many: <note>, <mode>.
+    constexpr std::size_t kShort = 4;
+    if (meant && meant->size() <= kShort && meant->size() == tag.size() &&
+        !std::is_permutation(tag.begin(), tag.end(), meant->begin())) {
+      return {};
+    }
+    return meant;
+  }
+
+  // What a module has already was not misspelt.
+  void warn_of_misspelt_parts(const XmlNode& module) {
+    std::vector<std::string_view> missing{"name", "node", "prefix", "parameters"};
+    for (const XmlNode& child : Elements(module.first_child)) std::erase(missing, child.text);
+    for (const XmlNode& child : Elements(module.first_child)) {
+      if (!is_part(child.text)) warn_if_misspelt(child, missing);
+    }
+  }
+
+  static bool is_part(std::string_view tag) {
+    return tag == "name" || tag == "node" || tag == "prefix" || tag == "parameters";
   }
 
   // Of what is not ours nothing is an error: a text that cannot be read tells nothing.
@@ -76,6 +120,7 @@ class ApplicationReader {
         add_prefix(parameters.substr(first, parameters.find(' ', first) - first), module.prefixes);
       }
     }
+    warn_of_misspelt_parts(element);
     auto& all = application_.prefixes;
     all.insert(all.end(), module.prefixes.begin(), module.prefixes.end());
     add_prefix(module.name, all);
@@ -133,9 +178,15 @@ class ApplicationReader {
     for (const XmlNode& element : Elements(connection.first_child)) {
       if (element.text == tag) return read_name(element);
     }
-    diagnostics_.error(
-        "incomplete-connection", locate(file_, connection),
-        "this connection lacks <" + std::string(tag) + ">; write the name of a port in it");
+    std::string advice = "write the name of a port in it";
+    for (const XmlNode& element : Elements(connection.first_child)) {
+      if (element.text == "from" || element.text == "to" || !misspelt_for(element.text, {tag})) {
+        continue;
+      }
+      advice = "did you mean it where it has <" + std::string(element.text) + ">?";
+    }
+    diagnostics_.error("incomplete-connection", locate(file_, connection),
+                       "this connection lacks <" + std::string(tag) + ">; " + advice);
     return {};
   }
 

@@ -11,18 +11,6 @@
 namespace arbiter::rules {
 namespace {
 
-// Other multiplexers give a timeout and a priority to whoever commands.
-std::string_view advice_on_attribute(std::string_view attribute) {
-  if (attribute == "timeout") {
-    return "a source has one: write <source port=\"…\" timeout=\"…\"/> beside the behaviours";
-  }
-  if (attribute == "priority") {
-    return "name those that it keeps out in an <inhibition>, or write <arbiter at=\"…\" "
-           "conflict=\"first\"/>, so that the first in the file wins";
-  }
-  return {};
-}
-
 class BehaviourReader {
  public:
   BehaviourReader(ElementReader& reader, Model& model, Diagnostics& diagnostics)
@@ -30,7 +18,7 @@ class BehaviourReader {
 
   void read(const XmlNode& element) {
     behaviour_.is_meta = is_meta_behaviour(element.text);
-    reader_.check_attributes(element, {"name"}, advice_on_attribute);
+    reader_.check_attributes(element, {"name"});
     // It may be a condition without its tags.
     if (!reader_.check_no_text(element.first_child)) behaviour_.is_incomplete = true;
     read_name(element);
@@ -100,7 +88,7 @@ class BehaviourReader {
   }
 
   bool read_config(const XmlNode& element) {
-    reader_.check_attributes(element, {"at"}, advice_on_attribute);
+    reader_.check_attributes(element, {"at"});
     const auto port = reader_.port_attribute(element, "at");
     const auto text = reader_.text(element);
     const auto source = text ? reader_.port_name(*text, "the output port") : std::nullopt;

@@ -63,13 +63,14 @@ struct Foreign {
   std::string_view advice;
 };
 
+// Words, not what XML would take for a tag: whoever copies "<->" into a model is refused again.
 constexpr auto kForeignOperators = std::to_array<Foreign>({
-    {"<=>", "write iff or <->"},
+    {"<=>", "write iff"},
     {"=>", "write implies or ->"},
     {"<=", "write implies or ->, what follows behind it"},
     {"<-", "write implies or ->, what follows behind it"},
     {"⇒", "write implies or ->"},
-    {"⇔", "write iff or <->"},
+    {"⇔", "write iff"},
     {"⊕", "write xor"},
     {"^", "write xor"},
     {"∀", "write all(/Nav/*)"},
@@ -83,7 +84,7 @@ constexpr std::string_view kDoubleEquals = "==";
 constexpr auto kNoComparisons = std::to_array<Foreign>({
     {"!=", "write xor"},
     {"=",
-     "write iff or <-> between conditions; /x alone says that /x is active, and \"not /x\" that "
+     "write iff between conditions; /x alone says that /x is active, and \"not /x\" that "
      "it is not"},
 });
 
@@ -105,7 +106,7 @@ constexpr auto kForeignWords = std::to_array<Foreign>({
     {"unless", "write and not (…) around all that follows"},
     {"never", "write not"},
     {"always", "a rule holds whenever it is true: write the condition alone"},
-    {"equals", "write iff or <->"},
+    {"equals", "write iff"},
     {"but", "write and"},
 });
 
@@ -209,10 +210,10 @@ void ConditionLexer::reject_foreign_operator() const {
   if (rest().starts_with("<->")) return;
   for (const auto& [spelling, advice] : kForeignOperators) reject(spelling, advice);
   if (language_ == Language::kStatement) {
-    reject(kDoubleEquals, "write = behind winner(…), and iff or <-> between conditions");
+    reject(kDoubleEquals, "write = behind winner(…), and iff between conditions");
     return;
   }
-  reject(kDoubleEquals, "write iff or <->");
+  reject(kDoubleEquals, "write iff");
   for (const auto& [spelling, advice] : kNoComparisons) reject(spelling, advice);
 }
 

@@ -26,23 +26,58 @@ std::string list(KnownNames names, std::string_view before, std::string_view aft
 std::string propose(std::string_view name, KnownNames known, std::string_view before,
                     std::string_view after) {
   if (known.size() == 0) return "; remove it";
-  const auto similar = find_similar(name, std::vector<std::string_view>(known));
+  auto similar = find_similar(name, std::vector<std::string_view>(known));
+  // "inhibit", "configuration"
+  constexpr std::size_t kLeast = 4;
+  for (const std::string_view each : known) {
+    const bool is_begun = name.size() >= kLeast && each.starts_with(name);
+    if (!similar && (is_begun || name.starts_with(each))) similar = std::string(each);
+  }
   if (similar) {
     return "; did you mean " + std::string(before) + *similar + std::string(after) + "?";
   }
   return "; it takes " + list(known, before, after);
 }
 
+bool contains(KnownNames names, std::string_view name) {
+  return std::find(names.begin(), names.end(), name) != names.end();
+}
+
+// What belongs elsewhere, or is called otherwise. Other multiplexers give a timeout and a priority
+// to whoever commands. Empty: nothing is known of it.
+std::string_view advice_on(std::string_view attribute, std::string_view element, KnownNames known) {
+  if (attribute == "timeout" || attribute == "time") {
+    if (contains(known, "timeout")) return "did you mean timeout?";
+    return "a source has one: write <source port=\"…\" timeout=\"…\"/> beside the behaviours";
+  }
+  if (attribute == "priority") {
+    return "name those that it keeps out in an <inhibition>, or write <arbiter at=\"…\" "
+           "conflict=\"first\"/>, so that the first in the file wins";
+  }
+  if (element == "config" && attribute == "from") {
+    return "write the output port between the tags: <config at=\"…\">…</config>";
+  }
+  if (element == "config" && (attribute == "to" || attribute == "port")) return "did you mean at?";
+  if (element == "select" && (attribute == "to" || attribute == "at")) {
+    return "the <arbiter at=\"…\"> around it says where";
+  }
+  return {};
+}
+
+constexpr std::string_view kNoInclude =
+    "no file includes another; give all files of a model together, as in `arbiter check robot.xml "
+    "arm.xml` and `arbiterd --model robot.xml arm.xml`, and all mappings to the gateway";
+
 }  // namespace
 
-bool ElementReader::check_attributes(const XmlNode& element, KnownNames known, Advice advice) {
+bool ElementReader::check_attributes(const XmlNode& element, KnownNames known) {
   bool fine = true;
   for (std::size_t i = 0; i < element.attributes.size(); ++i) {
     const XmlAttribute& attribute = element.attributes[i];
     const Location where = file_.locate(file_.offset_of(attribute.name.data()));
-    if (std::find(known.begin(), known.end(), attribute.name) == known.end()) {
+    if (!contains(known, attribute.name)) {
       error("unknown-attribute", where, [&] {
-        const std::string_view better = advice == nullptr ? "" : advice(attribute.name);
+        const std::string_view better = advice_on(attribute.name, element.text, known);
         return in_brackets(element) + " has no attribute " + quote(attribute.name) +
                (better.empty() ? propose(attribute.name, known, "", "")
                                : "; " + std::string(better));
@@ -130,6 +165,12 @@ bool ElementReader::check_no_text(const XmlNode* first_child) {
 
 void ElementReader::report_unknown_element(const XmlNode& element, KnownNames known) {
   error("unknown-element", where(element), [&] {
+    const bool is_include = element.text == "include" || element.text.ends_with(":include");
+    if (is_include) return std::string(kNoInclude);
+    if (contains(known, "config") && find_similar(element.text, {"connection"})) {
+      return in_brackets(element) +
+             " is not known here; write a connection as <config at=\"…\">…</config>";
+    }
     return in_brackets(element) + " is not known here" + propose(element.text, known, "<", ">");
   });
 }

@@ -27,10 +27,8 @@ class ElementReader {
 
   [[nodiscard]] Location where(const XmlNode& element) const { return locate(file_, element); }
 
-  // What to do about an attribute that belongs elsewhere; empty: nothing is known of it.
-  using Advice = std::string_view (*)(std::string_view attribute);
   // Reports attributes that are not known, and those that occur twice.
-  bool check_attributes(const XmlNode& element, KnownNames known, Advice advice = nullptr);
+  bool check_attributes(const XmlNode& element, KnownNames known);
   static bool has_attribute(const XmlNode& element, std::string_view name);
   // Of an attribute, decoded and expanded. Nothing is reported if it is absent.
   std::optional<Text> optional_attribute(const XmlNode& element, std::string_view name);

@@ -65,7 +65,8 @@ std::size_t Hierarchy::look_up(const Mention& mention) const {
   if (!list.empty()) {
     advice = "; names are separated by commas: write " + quote(list);
   } else if (advice.empty()) {
-    advice = advise(mention.name, known, "define it, or correct the name");
+    advice = advise(mention.name, known,
+                    "define it, correct the name, or give the file that has it as well");
   }
   diagnostics_.error("unknown-name", mention.where,
                      "no behaviour has the name " + quote(mention.name) + advice,

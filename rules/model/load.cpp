@@ -40,7 +40,11 @@ void add_application(const TextFile& file, LoadedModel& loaded, Diagnostics& dia
 void read_all(const ModelTexts& texts, Defines& defines, LoadedModel& loaded,
               Diagnostics& diagnostics) {
   std::set<std::string> read;
+  Defines::LaterFiles later;
+  for (const FileText& each : texts.models) later.emplace_back(each.path, each.content);
   for (const FileText& each : texts.models) {
+    later.erase(later.begin());
+    defines.expect_later(later);
     if (!read.insert(each.path).second) {
       diagnostics.error("duplicate-file", {each.path, 1, 1},
                         "this file is given twice; give it once");

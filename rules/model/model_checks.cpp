@@ -144,6 +144,10 @@ class UnpublishedSources {
 
   void warn(const RuleSet& rules) {
     std::set<std::string_view> known;  // that are fine, or reported
+    // A connection that the application lacks is an error of its own.
+    for (const PortRules& port : rules.ports) {
+      for (const ConnectionRule& rule : port.rules) known.insert(rule.source);
+    }
     std::unordered_set<const Expression*> seen;
     for (const PortRules& port : rules.ports) {
       for (const ConnectionRule& rule : port.rules) {

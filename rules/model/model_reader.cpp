@@ -152,16 +152,14 @@ class ModelReader {
     refuse(element, model_);
     if (element.text == "application") {
       reader_.error("unknown-element", reader_.where(element),
-                    "this is an application file, not a model, because it has no <arbitration>; "
-                    "give it with --application");
+                    "this is an application file, not a model, because it has no <arbitration>; " +
+                        advice_on_application(element));
+    } else if (!is_in_root_ && find_similar(element.text, {kApplication})) {
+      reader_.report_unknown_element(element, {kApplication});
     } else if (is_root(element.text)) {
       reader_.error("unknown-element", reader_.where(element),
                     "<" + std::string(element.text) +
                         "> is a root; put it around everything, or leave it away");
-    } else if (element.text == "include" || element.text.ends_with(":include")) {
-      reader_.error("unknown-element", reader_.where(element),
-                    "no file includes another; give all files of a model together, as in "
-                    "`arbiter check robot.xml arm.xml` and `arbiterd --model robot.xml arm.xml`");
     } else if (is_in_root_) {
       reader_.report_unknown_element(element,
                                      {"define", "source", "behavior", "meta_behavior", "arbiter"});
@@ -169,6 +167,14 @@ class ModelReader {
       reader_.report_unknown_element(
           element, {"behaviors", "define", "source", "behavior", "meta_behavior", "arbiter"});
     }
+  }
+
+  static std::string advice_on_application(const XmlNode& application) {
+    for (const XmlNode& element : Elements(application.first_child)) {
+      if (!find_similar(element.text, {kArbitration})) continue;
+      return "did you mean that where it has <" + std::string(element.text) + ">?";
+    }
+    return "give it with --application";
   }
 
   void announce_defines(const XmlNode* first) {

@@ -9,6 +9,7 @@
 
 #include "rules/text/names.hpp"
 #include "rules/text/similar_names.hpp"
+#include "rules/text/xml.hpp"
 
 namespace arbiter::rules {
 namespace {
@@ -17,15 +18,24 @@ std::string origin_of(const NameUse& use) {
   return use.define.empty() ? "" : " (in the text of ${" + use.define + "})";
 }
 
+// ":i" or ":o", in whatever case; nothing where the name does not end so.
+std::string_view end_of(std::string_view name) {
+  if (name.size() < 2 || name[name.size() - 2] != ':') return {};
+  const char end = name.back();
+  if (end == 'o' || end == 'O') return ":o";
+  return end == 'i' || end == 'I' ? ":i" : std::string_view();
+}
+
 // The names of one kind: of sources, or of input ports. `uses` are those of the model, `all` those
 // of its application, too: what stands there alone is for others to judge.
 class NameCheck {
  public:
   NameCheck(const NameUses& uses, const NameUses& all, std::string element,
-            const DocumentOrder& order, Diagnostics& diagnostics)
+            std::string_view wrong_end, const DocumentOrder& order, Diagnostics& diagnostics)
       : uses_(uses),
         all_(all),
         element_(std::move(element)),
+        wrong_end_(wrong_end),
         order_(order),
         diagnostics_(diagnostics),
         names_(names_of(all)),
@@ -81,6 +91,7 @@ class NameCheck {
     const NameUse* best = nullptr;
     for (const SimilarName& similar : index_.similar_to(name)) {
       const NameUse& other = *all_.find(std::string(similar.name));
+      if (end_of(similar.name) == wrong_end_) continue;  // that one is to be corrected itself
       if (!is_meant_rather(similar, other, use)) continue;
       if (best != nullptr && !is_better(other, *best, use)) continue;
       meant = similar.name;
@@ -111,12 +122,13 @@ class NameCheck {
                              ", and nothing declares it; did you mean " + std::string(meant) +
                              ", as at " + describe(other.where) + origin_of(other) +
                              "? If both are right, declare this one with <" + element_ + "=\"" +
-                             name + "\"/>");
+                             escape_xml(name) + "\"/>");
   }
 
   const NameUses& uses_;
   const NameUses& all_;
   const std::string element_;
+  const std::string_view wrong_end_;  // of a name: ":i", or ":o"
   const DocumentOrder& order_;
   Diagnostics& diagnostics_;
   const std::vector<std::string_view> names_;
@@ -152,14 +164,6 @@ void warn_of_unread(const Model& model, const RuleSet& rules, NameCheck& names, 
                         // Of a misspelt name nobody else can say that it is right.
                         {.ports = {}, .source = written ? "" : source.name});
   }
-}
-
-// ":i" or ":o", in whatever case; nothing where the name does not end so.
-std::string_view end_of(std::string_view name) {
-  if (name.size() < 2 || name[name.size() - 2] != ':') return {};
-  const char end = name.back();
-  if (end == 'o' || end == 'O') return ":o";
-  return end == 'i' || end == 'I' ? ":i" : std::string_view();
 }
 
 // Names that stand where the other end of a connection belongs. A name that is used for both counts
@@ -225,10 +229,10 @@ void check_names(const Model& model, const std::optional<Application>& applicati
   }
   for (const auto& [name, use] : model.source_uses) warn_of_pattern(name, use, diagnostics);
   for (const auto& [name, use] : model.port_uses) warn_of_pattern(name, use, diagnostics);
-  NameCheck source_check(model.source_uses, sources, "source port", order, diagnostics);
+  NameCheck source_check(model.source_uses, sources, "source port", ":i", order, diagnostics);
   if (rules != nullptr) warn_of_unread(model, *rules, source_check, sources, diagnostics);
   source_check.warn();
-  NameCheck port_check(model.port_uses, ports, "arbiter at", order, diagnostics);
+  NameCheck port_check(model.port_uses, ports, "arbiter at", ":o", order, diagnostics);
   port_check.warn();
   WrongEnds(model, diagnostics).warn();
   if (!source_check.is_exhausted() && !port_check.is_exhausted()) return;

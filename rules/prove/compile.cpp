@@ -20,7 +20,7 @@ class ModelCompiler {
                 std::size_t max_precedence_nodes)
       : rules_(rules),
         diagnostics_(diagnostics),
-        context_(budget, attempt_, max_precedence_nodes) {}
+        context_(rules, budget, attempt_, max_precedence_nodes) {}
 
   CompiledModel compile();
 

@@ -11,6 +11,7 @@
 #include "rules/prove/rule_builder.hpp"
 #include "rules/prove/winners.hpp"
 #include "rules/text/names.hpp"
+#include "rules/text/xml.hpp"
 
 namespace arbiter::rules {
 namespace {
@@ -54,6 +55,8 @@ class PortCompiler {
   void report_never_selected();
   void report_conflicts();
   Witness witness_of(const Proof::Pair& pair);
+  [[nodiscard]] std::string advice_on_inhibition(const std::string& first,
+                                                 const std::string& second) const;
   void report_conflict(const Proof::Pair& pair);
   void report_in_order(const InOrder& order);
   void report_outgrown(const ConnectionRule* rule);
@@ -334,16 +337,29 @@ Witness PortCompiler::witness_of(const Proof::Pair& pair) {
   return witness;
 }
 
+// "let one inhibit the other, ", as far as that would help.
+std::string PortCompiler::advice_on_inhibition(const std::string& first,
+                                               const std::string& second) const {
+  std::vector<std::size_t> one, other;
+  for (const BehaviourPart& part : task_.parts) {
+    if (part.rule->source == first) one.push_back(part.behaviour);
+    if (part.rule->source == second) other.push_back(part.behaviour);
+  }
+  const std::string advice = context_.advice.inhibition(one, other);
+  return advice.empty() ? advice : advice + ", ";
+}
+
 void PortCompiler::report_conflict(const Proof::Pair& pair) {
   const auto& first = port_.rules[pair.first];
   const auto& second = port_.rules[pair.second];
   Witness witness = witness_of(pair);
   std::string message = second.source + " and " + first.source + " (" +
                         rules::describe(first.where) + ") can both win at " + port_.port +
-                        " when " + describe(witness) +
-                        "; let one inhibit the other, give one a condition that excludes the "
-                        "other, or let document order decide with <arbiter at=\"" +
-                        port_.port + R"(" conflict="first"/>)";
+                        " when " + describe(witness) + "; " +
+                        advice_on_inhibition(first.source, second.source) +
+                        "give one a condition that excludes the other, or let document order "
+                        "decide with <arbiter at=\"" +
+                        escape_xml(port_.port) + R"(" conflict="first"/>)";
   Subject about{.ports = {port_.port}, .source = second.source, .behaviour = second.behaviour};
   for (const auto* rule : {&first, &second}) about.winners.emplace_back(port_.port, rule->source);
   context_.diagnostics.error("both-can-win", second.where, std::move(message), std::move(about),

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "rules/prove/compiled_model.hpp"
+#include "rules/prove/conflict_advice.hpp"
 #include "rules/prove/diagram.hpp"
 #include "rules/prove/proof.hpp"
 #include "rules/prove/state_search.hpp"
@@ -21,14 +22,15 @@ inline constexpr std::uint64_t kMaxPrecedenceSteps = 500'000;
 
 // What the ports of one model share.
 struct CompileContext {
-  CompileContext(Budget& of_all, Diagnostics& to, std::size_t most)
-      : budget(of_all), diagnostics(to), max_precedence_nodes(most) {}
+  CompileContext(const RuleSet& rules, Budget& of_all, Diagnostics& to, std::size_t most)
+      : budget(of_all), diagnostics(to), max_precedence_nodes(most), advice(rules) {}
 
   Budget& budget;
   DiagramBuilder builder{budget};
   Proof proof{budget};
   Diagnostics& diagnostics;
   const std::size_t max_precedence_nodes;
+  ConflictAdvice advice;
 };
 
 // A behaviour's part in the rule of one connection of the port.

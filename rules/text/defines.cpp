@@ -77,6 +77,12 @@ const std::string* Defines::look_up(const std::string& name, const Text& text, s
   }
   std::vector<std::string_view> known;
   if (diagnostics.items().size() < kMaxSuggestions) {
+    if (const auto file = later_file_with(name); !file.empty()) {
+      diagnostics.error("unknown-define", text.where(at),
+                        "${" + name + "} is used before it is defined, in " + std::string(file) +
+                            "; give that file before this one");
+      return nullptr;
+    }
     for (const auto& [other, define] : defines_) known.push_back(other);
   }
   diagnostics.error("unknown-define", text.where(at),
@@ -85,6 +91,21 @@ const std::string* Defines::look_up(const std::string& name, const Text& text, s
                                "write <define name=\"…\"> for it further up, or give the file "
                                "that has it before this one"));
   return nullptr;
+}
+
+std::string_view Defines::later_file_with(std::string_view name) const {
+  constexpr std::string_view kTag = "<define";
+  for (const auto& [path, content] : later_) {
+    for (std::size_t at = content.find(kTag); at != std::string_view::npos;
+         at = content.find(kTag, at + 1)) {
+      const std::string_view tag = content.substr(at, content.find('>', at) - at);
+      const std::size_t quoted = tag.find_first_of("\"'");
+      if (quoted == std::string_view::npos) continue;
+      const std::string_view rest = tag.substr(quoted + 1);
+      if (collapse_blanks(rest.substr(0, rest.find(tag[quoted]))) == name) return path;
+    }
+  }
+  return {};
 }
 
 void Defines::note_unused(Diagnostics& diagnostics) const {

@@ -6,6 +6,8 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
+#include <vector>
 
 #include "rules/text/diagnostic.hpp"
 #include "rules/text/text.hpp"
@@ -29,6 +31,10 @@ class Defines {
   // Tells of a define further down in the file that is being read, so that a use before it is
   // explained.
   void announce(const std::string& name, const Location& where);
+  // Files of the model that are read after this one, by path and content: a define that is found
+  // there is told. Keeps views.
+  using LaterFiles = std::vector<std::pair<std::string_view, std::string_view>>;
+  void expect_later(LaterFiles files) { later_ = std::move(files); }
   // From here on unknown names are not reported: some file could not be read, and with it perhaps
   // their defines.
   void expect_gaps() { expects_gaps_ = true; }
@@ -49,11 +55,14 @@ class Defines {
   // The define that a use names, or nothing, reported.
   const std::string* look_up(const std::string& name, const Text& text, std::size_t at,
                              Diagnostics& diagnostics);
+  // The later file that defines it; empty: none does, as far as a look without XML can tell.
+  [[nodiscard]] std::string_view later_file_with(std::string_view name) const;
   bool take_account_of(std::size_t bytes, const Text& text, std::size_t at,
                        Diagnostics& diagnostics);
 
   std::map<std::string, Define> defines_;
   std::map<std::string, Location> announced_;
+  LaterFiles later_;
   std::size_t expanded_in_all_ = 0;
   bool expects_gaps_ = false;
 };

@@ -26,10 +26,46 @@ const Unit* find_unit(std::string_view name, bool takes_minutes) {
   return unit == kUnits.end() ? nullptr : unit;
 }
 
-// "300s" for "5min", where minutes are not taken; empty: it is no such duration, or too long.
-std::string without_minutes(std::string_view text) {
-  const ParsedDuration parsed = parse_duration(text, {.takes_minutes = true});
-  return parsed.problem.empty() ? to_string(parsed.value) : std::string();
+// What others write for a unit, and how many of which of ours it is.
+struct ForeignUnit {
+  std::string_view spelling, unit;
+  shm::Nanoseconds count = 1;
+};
+constexpr auto kForeignUnits = std::to_array<ForeignUnit>({{"h", "s", 3600},
+                                                           {"hour", "s", 3600},
+                                                           {"hours", "s", 3600},
+                                                           {"min", "s", 60},
+                                                           {"minute", "s", 60},
+                                                           {"minutes", "s", 60},
+                                                           {"sec", "s"},
+                                                           {"second", "s"},
+                                                           {"seconds", "s"},
+                                                           {"msec", "ms"},
+                                                           {"usec", "us"},
+                                                           {"µs", "us"},
+                                                           {"μs", "us"},
+                                                           {"nsec", "ns"}});
+
+std::string in_small_letters(std::string_view text) {
+  std::string result(text);
+  for (char& each : result) each = each >= 'A' && each <= 'Z' ? static_cast<char>(each + 32) : each;
+  return result;
+}
+
+// "300s" for "5min" and "5 min"; empty: it is no such duration, or too long.
+std::string in_our_units(std::string_view digits, std::string_view written) {
+  std::string unit = in_small_letters(trim(written));
+  shm::Nanoseconds count = 1;
+  for (const ForeignUnit& each : kForeignUnits) {
+    if (each.spelling != unit) continue;
+    unit = each.unit;
+    count = each.count;
+    break;
+  }
+  if (find_unit(unit, false) == nullptr) return {};
+  const ParsedDuration parsed = parse_duration(std::string(digits) + unit);
+  if (!parsed.problem.empty() || parsed.value > shm::kMaxTime / count) return {};
+  return to_string(parsed.value * count);
 }
 
 // "500ms" for "0.5s"; empty: it is no such fraction, or no whole number of nanoseconds.
@@ -73,7 +109,9 @@ ParsedDuration parse_duration(std::string_view text, const DurationWords& words)
   if (lacks_zero) return parse_duration("0" + std::string(text), words);
   const std::size_t digits = text.find_first_not_of("0123456789");
   if (text.empty() || digits == 0) {
-    const bool is_endless = text.starts_with("inf") || text == "never" || text == "always";
+    const std::string word = in_small_letters(text);
+    const bool is_endless =
+        word.starts_with("inf") || word == "never" || word == "always" || word == "-1";
     const bool means_forever =
         words.takes_forever && (is_endless || find_similar(text, {kForever}));
     return refuse("is not a whole number with a unit",
@@ -86,12 +124,13 @@ ParsedDuration parse_duration(std::string_view text, const DurationWords& words)
   if (known == nullptr) {
     if (unit.find_first_not_of("0123456789.,") == std::string_view::npos)
       return refuse("has no unit", words.advice);
-    if (unit.front() == ' ')
-      return refuse("has a blank", "write the unit right behind the number, as in 500ms");
-    if (const auto seconds = unit == kMinutes.first ? without_minutes(text) : ""; !seconds.empty())
-      return refuse("has an unknown unit", "write " + seconds + " in its place");
+    const bool has_blank = unit.front() == ' ';
+    const std::string why = has_blank ? "has a blank" : "has an unknown unit";
+    if (const auto ours = in_our_units(text.substr(0, digits), unit); !ours.empty())
+      return refuse(why, "write " + ours + " in its place");
+    if (has_blank) return refuse(why, "write the unit right behind the number, as in 500ms");
     const bool is_fraction = unit.starts_with('.') || unit.starts_with(',');
-    if (!is_fraction) return refuse("has an unknown unit", words.advice);
+    if (!is_fraction) return refuse(why, words.advice);
     const std::string whole = without_fraction(text, words.takes_minutes);
     return refuse("is a fraction",
                   whole.empty() ? "take a smaller unit" : "write " + whole + " in its place");

@@ -102,6 +102,11 @@ Explanation explain_mismatch(const TextFile& file, const Scan& scanned,
           "this closing tag does not fit " + opened + ", which must be closed first"};
 }
 
+// An operator of conditions, or what others write for it.
+bool is_equivalence(std::string_view text) {
+  return text.starts_with("<->") || text.starts_with("<=>");
+}
+
 Explanation explain(const TextFile& file, const pugi::xml_parse_result& result) {
   const auto offset = static_cast<std::size_t>(result.offset);
   const Scan scanned = scan(file.content().substr(0, offset + 1));
@@ -122,7 +127,10 @@ Explanation explain(const TextFile& file, const pugi::xml_parse_result& result) 
     case pugi::status_bad_attribute:
       return here("an attribute of this tag is malformed; write name=\"value\"");
     case pugi::status_unrecognized_tag:
-      return here("'<' must begin a tag here; where the character is meant, write &lt;");
+      return here(std::string("'<' must begin a tag here; ") +
+                  (is_equivalence(file.content().substr(scanned.construct))
+                       ? "write iff for this operator"
+                       : "where the character is meant, write &lt;"));
     case pugi::status_bad_end_element:
     case pugi::status_end_element_mismatch:
       return explain_mismatch(file, scanned, result.status);
@@ -349,6 +357,15 @@ std::string_view reference_for(char character) {
     default:
       return {};
   }
+}
+
+std::string escape_xml(std::string_view text) {
+  std::string result;
+  for (const char each : text) {
+    const std::string_view reference = reference_for(each);
+    result += reference.empty() ? std::string_view(&each, 1) : reference;
+  }
+  return result;
 }
 
 }  // namespace arbiter::rules

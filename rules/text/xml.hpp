@@ -88,4 +88,7 @@ bool decode(const TextFile& file, std::string_view written, Text& text, Diagnost
 // empty for what may stand there as it is.
 std::string_view reference_for(char character);
 
+// A text as it stands in a file: for what is to be copied from a message, too.
+std::string escape_xml(std::string_view text);
+
 }  // namespace arbiter::rules

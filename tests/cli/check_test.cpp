@@ -79,6 +79,25 @@ TEST(Check, WritesTheSameAsJson) {
                                                            "inactive": ["/c"], "shortest": true})"));
 }
 
+// A condition that names a source of another host in vain requires nothing of it.
+TEST(Check, OfHostsIsSilentAboutWhatDecidesNothing) {
+  TemporaryDirectory directory;
+  const auto model = directory.write(
+      "m.xml",
+      "<behaviors><source port='/Man:o' timeout='forever'/><behavior name='Drive'>"
+      "<config at='/Base:i'>/Nav:o</config><condition>/Man:o or not /Man:o</condition></behavior>"
+      "</behaviors>");
+  const auto modules = directory.write("app.xml",
+                                       "<application>"
+                                       "<module><name>Base</name><node>a</node></module>"
+                                       "<module><name>Nav</name><node>a</node></module>"
+                                       "<module><name>Man</name><node>b</node></module>"
+                                       "</application>");
+  const auto result = arbiter({"check", model, "--hosts", modules, "--silence", "crosses-network"});
+  EXPECT_EQ(result.exit_code, 0);
+  EXPECT_EQ(result.err, "");
+}
+
 TEST(Check, WritesAnEmptyArrayOfJsonIfNothingWasFound) {
   TemporaryDirectory directory;
   const auto result = arbiter({"check", directory.write("m.xml", kOverrideModel), "--json"});

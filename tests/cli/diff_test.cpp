@@ -40,6 +40,7 @@ TEST_F(Diff, ADifferenceEndsWithOne) {
   EXPECT_EQ(result.out,
             "timeout of /high: 500ms -> 2s\n"
             "/p\n"
+            "  read only after: /stop\n"
             "  decides differently in 2 of 2^3 = 8 states\n"
             "  /high -> nobody: 2 states, such as with /high and /stop active\n"
             "1 of 1 port decides differently (/p); 1 timeout changed\n");

@@ -192,6 +192,15 @@ TEST(Graph, DrawsOnlyWhatDecidesAtAPort) {
   const auto none = arbiter({"graph", model, "--format", "dot", "--port", "/s"});
   EXPECT_EQ(none.exit_code, 1);
   EXPECT_THAT(none.err, HasSubstr("no input port /s"));
+  const auto source = arbiter({"graph", model, "--format", "dot", "--port", "/three"});
+  EXPECT_EQ(source.exit_code, 1);
+  EXPECT_THAT(source.err, HasSubstr("/three is an output port, connected to /r; give the input "
+                                    "port first: --port /r"));
+  EXPECT_THAT(arbiter({"graph", model, "--port", "/threee"}).err,
+              HasSubstr("no input port /threee; did you mean the output port \"/three\", "));
+  const auto bare = arbiter({"graph", model, "--port", "p"});
+  EXPECT_EQ(bare.exit_code, 2);
+  EXPECT_THAT(bare.err, HasSubstr("write \"/p\" for \"p\""));
 }
 
 // Bytes 16 to 23 of a PNG are its width and height.

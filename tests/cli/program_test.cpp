@@ -264,11 +264,13 @@ TEST(Program, ATimeIsRefusedInTheWordsOfItsOption) {
   EXPECT_THAT(problem({"echo", "/p", "--for", "0s"}),
               HasSubstr("--for: \"0s\" is zero; write at least 1ns"));
   EXPECT_THAT(problem({"top", "--interval", "1h"}),
-              HasSubstr("--interval: \"1h\" has an unknown unit; write a whole number with a unit "
+              HasSubstr("--interval: \"1h\" has an unknown unit; write 3600s in its place"));
+  EXPECT_THAT(problem({"top", "--interval", "1d"}),
+              HasSubstr("--interval: \"1d\" has an unknown unit; write a whole number with a unit "
                         "(ns, us, ms, s or min)"));
   EXPECT_THAT(problem({"wait", "--until", "idle(/p)", "--timeout", "0h"}),
               HasSubstr("unknown unit"));
-  for (const std::string text : {"1h", "5", "min", "1smin"}) {
+  for (const std::string text : {"1d", "5", "min", "1smin"}) {
     EXPECT_THAT(problem({"record", "-o", "r.mcap", "--duration", text}),
                 HasSubstr("(ns, us, ms, s or min)"))
         << text;

@@ -2,6 +2,9 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <sstream>
+#include <string>
+#include <vector>
 
 #include "tests/cli/arbiter_program.hpp"
 #include "tests/support/temporary_directory.hpp"
@@ -10,6 +13,7 @@ namespace arbiter::test {
 namespace {
 
 using testing::HasSubstr;
+using testing::StartsWith;
 
 class Simulate : public testing::Test {
  protected:
@@ -107,6 +111,26 @@ TEST_F(Simulate, ExplainsInsteadWithWhy) {
                 "0.000000003 s  /p  /high -> /low  because /high was deactivated\n");
 }
 
+// A publisher of 100 Hz would fill the screen; what keeps it out is the same each time.
+TEST_F(Simulate, CountsWhatIsDiscardedAgainForTheSameReason) {
+  const auto result = simulate(
+      "t_ns,source,event\n0,/high,\n1000,/low,\n2000,/low,\n3000,/low,\n4000,/high,deactivate\n"
+      "5000,/high,\n6000,/low,\n7000,/low,\n",
+      {"--why"});
+  std::vector<std::string> lines;
+  std::istringstream text(result.out);
+  for (std::string line; std::getline(text, line);) {
+    if (line.find("discarded") != std::string::npos) lines.push_back(line);
+  }
+  ASSERT_EQ(lines.size(), 4u) << result.out;
+  EXPECT_THAT(lines[0], StartsWith("0.000001 s  /p  /low discarded: inhibited by behaviour "));
+  EXPECT_EQ(lines[1],
+            "0.000004 s  /p  /low was discarded 2 more times for that reason, until 0.000003 s");
+  EXPECT_THAT(lines[2], StartsWith("0.000006 s  /p  /low discarded: inhibited by behaviour "));
+  EXPECT_EQ(lines[3],
+            "0.000007 s  /p  /low was discarded 1 more time for that reason, until 0.000007 s");
+}
+
 // The port is behind '=', or there is none.
 TEST_F(Simulate, TakesTheModelBehindWhy) {
   const auto explained = simulate("t_ns,source\n0,/low\n", {"--why"});
@@ -135,6 +159,12 @@ TEST_F(Simulate, RefusesToExplainAPortThatThereIsNot) {
   EXPECT_EQ(result.exit_code, 1);
   EXPECT_EQ(result.out, "");
   EXPECT_THAT(result.err, HasSubstr("the model has no input port /q"));
+  EXPECT_THAT(simulate("t_ns,source\n0,/low\n", {"--why=/low"}).err,
+              HasSubstr("/low is an output port, connected to /p; give the input port first: "
+                        "--why=/p\n"));
+  EXPECT_THAT(simulate("t_ns,source\n0,/low\n", {"--why=/hihg"}).err,
+              HasSubstr("the model has no input port /hihg; did you mean the output port "
+                        "\"/high\", connected to /p? Then give the input port first: --why=/p\n"));
   EXPECT_EQ(simulate("t_ns,source\n", {"--json"}).exit_code, 2);
 }
 

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <arbiter/arbiter.hpp>
+#include <nlohmann/json.hpp>
 
 #include "tests/cli/arbiter_program.hpp"
 #include "tests/support/daemon.hpp"
@@ -74,10 +75,19 @@ TEST(Unmentioned, AChangeNamesInputPortsThatGetNothingFromNowOn) {
   EXPECT_THAT(arbiter({"reload", "--dry-run"}).out,
               HasSubstr("\n  open now, and no longer mentioned by the files of model \"default\", "
                         "so that no sample would arrive: /Gaze/pos:i\nthis was a dry run"));
+  const auto unmentioned = [](const ProgramResult& result) {
+    return nlohmann::json::parse(result.out).at("unmentioned");
+  };
+  const nlohmann::json gaze{"/Gaze/pos:i"};
+  EXPECT_EQ(unmentioned(arbiter({"reload", "--dry-run", "--json"})), gaze);
   EXPECT_THAT(arbiter({"reload"}).out,
               HasSubstr("\n  open, but not mentioned by this model, so that no sample arrives: "
                         "/Gaze/pos:i\n"));
+  EXPECT_EQ(unmentioned(arbiter({"reload", "--json"})), gaze);
   EXPECT_THAT(arbiter({"rollback"}).out, Not(HasSubstr("open")));
+  EXPECT_EQ(unmentioned(arbiter({"reload", "--dry-run", "--json"})), gaze);
+  daemon.write_model("<behaviors><x/></behaviors>");
+  EXPECT_EQ(unmentioned(arbiter({"reload", "--json"})), nullptr);
 }
 
 TEST(Unmentioned, AWatcherSaysThatNobodyHasNamedThePort) {

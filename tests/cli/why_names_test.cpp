@@ -66,6 +66,17 @@ TEST(WhyNames, OfASourceTellsAtWhichPortsItMatters) {
   EXPECT_THAT(arbiter({"why", "/stop:o"}).err,
               HasSubstr("/stop:o is an output port, read at /arm and /base; give the input port "
                         "first: arbiter why /arm /stop:o"));
+  EXPECT_THAT(arbiter({"why", "/wander", "--follow"}).err,
+              HasSubstr("/wander is an output port, connected to /arm and /base; give the input "
+                        "port first: arbiter why /arm --follow"));
+  for (const bool follows : {false, true}) {
+    const auto near =
+        follows ? arbiter({"why", "/wnader", "--follow"}) : arbiter({"why", "/wnader"});
+    EXPECT_EQ(near.exit_code, 1);
+    EXPECT_THAT(near.err, HasSubstr("named the input port /wnader; did you mean the output port "
+                                    "\"/wander\", connected to /arm and /base? Then give the "
+                                    "input port first: arbiter why /arm "));
+  }
 }
 
 TEST(WhyNames, TellsOfPortsUnderANearName) {

@@ -92,7 +92,11 @@ TEST(Program, ShowsWhatWasMeantByAWordOrAnExample) {
             "arbiter switch has no place for \"b\"; for example: arbiter switch");
   EXPECT_EQ(error({"why"}), "PORT is required; for example: arbiter why /Gaze/pos:i");
   EXPECT_EQ(error({"reload", "m.xml"}),
-            "arbiter reload has no place for \"m.xml\"; for example: arbiter reload");
+            "arbiter reload has no place for \"m.xml\"; it reads the files again that arbiterd was "
+            "started with; for example: arbiter reload");
+  EXPECT_EQ(error({"diff", "a.xml", "b.xml", "c.xml"}),
+            "arbiter diff has no place for \"c.xml\"; the files of one model are joined by commas, "
+            "as in a.xml,b.xml; for example: arbiter diff search_and_track.xml new.xml");
 }
 
 TEST(Program, ShowsControlCharactersInsteadOfSendingThem) {

@@ -3,7 +3,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -60,17 +59,6 @@ TEST(OnlyPorts, CanBeDrawn) {
   const auto part = only_ports(load_arm_and_gaze(), {"/arm"});
   EXPECT_THAT(draw(part, View::kBehaviours), HasSubstr("Safety inhibits Work"));
   EXPECT_THAT(draw(part, View::kConnections), HasSubstr("/stop is sensed at /arm"));
-}
-
-TEST(OnlyPorts, OfAPortThatIsNotThereAreNone) {
-  const auto loaded = load_arm_and_gaze();
-  EXPECT_NO_THROW(require_ports(loaded.rules, {"/arm", "/gaze"}));
-  try {
-    require_ports(loaded.rules, {"/arm", "/gazee"});
-    FAIL();
-  } catch (const std::runtime_error& error) {
-    EXPECT_THAT(error.what(), HasSubstr("no input port /gazee; did you mean \"/gaze\"?"));
-  }
 }
 
 }  // namespace

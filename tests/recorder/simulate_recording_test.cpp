@@ -221,8 +221,10 @@ TEST(SimulateRecording, TellsWhyWinnersChangedAndArrivalsWereDiscarded) {
                            "\n1970-01-01 00:00:00.005 (+0.000000100 s)  /p  /low -> /high  because "
                            "/high became active; /low is inhibited by "
                            "behaviour \"High\" (model.xml:",
-                           "\n1970-01-01 00:00:00.005 (+0.000000230 s)  /p  /low discarded: "
+                           "\n1970-01-01 00:00:00.005 (+0.000000200 s)  /p  /low discarded: "
                            "inhibited by behaviour \"High\" (model.xml:",
+                           "  /p  /low was discarded 3 more times for that reason, until "
+                           "1970-01-01 00:00:00.005 (+0.000000230 s)\n",
                            "\n1970-01-01 00:00:00.005 (+0.000000300 s)  /p  /high -> /low  because "
                            "/high was deactivated"}) {
     EXPECT_THAT("\n" + result.out, HasSubstr(line));
@@ -294,6 +296,21 @@ TEST(SimulateRecording, TellsWhyByTheModelThatWasInForce) {
   EXPECT_THAT(
       result.out,
       HasSubstr("\n1970-01-01 00:00:00.005 (+0.000000210 s)  /p  /high discarded: inhibited by "));
+}
+
+// The first model need not have the port.
+TEST(SimulateRecording, TellsWhyAtAPortThatALaterModelHas) {
+  Incident incident;
+  incident.arrive("/low", 1100, 1101, Incident::Fate::accepted);
+  incident.put_in_force("<behaviors><arbiter at='/q'><select from='/low'/></arbiter></behaviors>",
+                        2, 1300);
+  incident.arrive("/low", 1310, 1311, Incident::Fate::accepted);
+  const auto result = in_utc({"simulate", "--recording", incident.file(), "--why=/q"});
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.err, HasSubstr("model 1 has no input port /q: what it decided is left out\n"));
+  EXPECT_THAT(result.out, HasSubstr("  /q  /low wins as this begins\n"));
+  EXPECT_THAT(arbiter({"simulate", "--recording", incident.file(), "--why=/low"}).err,
+              HasSubstr("/low is an output port, connected to /q"));
 }
 
 // What lies between is not made up: neither by --why, nor silently by an export.

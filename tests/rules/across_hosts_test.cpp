@@ -190,10 +190,10 @@ TEST(AcrossHosts, ARemoteSourceCrossesAndACutFreesWhatItInhibits) {
 }
 
 TEST(AcrossHosts, WhatIsNegatedTwiceIsRequired) {
-  const auto checked =
-      check(R"(<behavior name="Drive"><config at="/Base:i">/Nav:o</config>
-      <condition>not (not /Free:o) and (/Man:o -> /Nav:o)</condition></behavior>)",
-            module("Base", "a") + module("Nav", "a") + module("Free", "b") + module("Man", "b"));
+  const auto checked = check(R"(<behavior name="Drive"><config at="/Base:i">/Nav:o</config>
+      <condition>not (not /Free:o) and (/Man:o -> /Free:o and /Nav2:o)</condition></behavior>)",
+                             module("Base", "a") + module("Nav", "a") + module("Nav2", "a") +
+                                 module("Free", "b") + module("Man", "b"));
   EXPECT_THAT(checked.findings(),
               ElementsAre("note crosses-network /Free:o", "note crosses-network /Man:o",
                           "warning negated-across-hosts /Man:o"));
@@ -224,6 +224,11 @@ TEST(AcrossHosts, ANegationIsToldWhereItIsWritten) {
                      "</behaviors>"),
             "5:1")
       << "of two conditions, the one that has it";
+  EXPECT_EQ(place_in("<behaviors>" + gaze + rest +
+                     "\n<condition>/Eye:o or not /Eye:o</condition>\n"
+                     "<condition>not /Eye:o</condition></behavior></behaviors>"),
+            "5:1")
+      << "and not one that names it in vain";
   EXPECT_EQ(
       place_in("<behaviors>" + gaze + "<meta_behavior name='All'><behavior>Rest</behavior>\n" +
                "<condition>none(/Eye*)</condition></meta_behavior>\n" + rest +

@@ -38,6 +38,37 @@ TEST(Application, SaysWhichConnectionsExist) {
   EXPECT_THAT(show_rules(loaded, "/p"), ElementsAre("/s: true"));
 }
 
+TEST(Application, WarnsOfAMisspeltElement) {
+  const Loaded loaded = load_with_application(
+      kModel, "<application>" + connection("/s", "/p") +
+                  "\n<conection><from>/a</from><to>/b</to></conection>"
+                  "\n<modules><module><name>m</name></module></modules>"
+                  "\n<Arbitration/>"
+                  "\n<module><nmae>m</nmae><prefx>/m</prefx><nodes>head</nodes></module>"
+                  "\n</application>");
+  EXPECT_THAT(loaded.findings(),
+              ElementsAre("2:1 warning misspelt-element", "3:1 warning misspelt-element",
+                          "4:1 warning misspelt-element", "5:9 warning misspelt-element",
+                          "5:23 warning misspelt-element", "5:40 warning misspelt-element"));
+  EXPECT_THAT(loaded.message(), HasSubstr("did you mean <connection>?"));
+}
+
+// YARP's own, what a module has beside its own, and short words that differ in a letter.
+TEST(Application, PassesOverWhatIsNoMisspeltElement) {
+  const Loaded loaded = load_with_application(
+      kModel, "<application><name>a</name><description/><authors/>" + connection("/s", "/p") +
+                  "<module><name>m</name><note>n</note><names/><rank>1</rank><mode/></module>"
+                  "</application>");
+  EXPECT_THAT(loaded.findings(), IsEmpty()) << loaded.message();
+}
+
+TEST(Application, SaysWhichEndOfAConnectionIsMisspelt) {
+  const Loaded loaded = load_with_application(
+      kModel, "<application>" + connection("/s", "/p") +
+                  "<connection><form>/a</form><to>/b</to></connection></application>");
+  EXPECT_THAT(loaded.message(), HasSubstr("lacks <from>; did you mean it where it has <form>?"));
+}
+
 TEST(Application, PassesOverEverythingElse) {
   const Loaded loaded = load_with_application(kModel, R"(<?xml version="1.0" encoding="UTF-8" ?>
     <!DOCTYPE application><?xml-stylesheet type="text/xsl" href="yarpmanager.xsl"?>
@@ -58,7 +89,7 @@ TEST(Application, PassesOverEverythingElse) {
       </connection>
       <connection><from>topic://map</from><to>/a&amp;b</to></connection>
       <arbiter><port>/p</port><rule connection="1">~2</rule></arbiter>
-      <Connection/><node>x</node>
+      <Dependency/><node>x</node>
     </application>)");
   EXPECT_THAT(loaded.findings(), IsEmpty()) << loaded.message();
   EXPECT_THAT(show_others(loaded), ElementsAre("topic://map -> /a&b"));

@@ -254,7 +254,7 @@ TEST(Condition, MalformedIsReportedAtTheByteThatIsWrong) {
       {"/a == /b", 4, "\"==\" is no operator here; write iff"},
       {"/a != /b", 4, "\"!=\" is no operator here; write xor"},
       {"/a => /b", 4, "\"=>\" is no operator here; write implies or ->"},
-      {"/a<=>/b", 3, "\"<=>\" is no operator here; write iff or <->"},
+      {"/a<=>/b", 3, "\"<=>\" is no operator here; write iff"},
       {"/a ⇒ /b", 4, "\"⇒\" is no operator here; write implies or ->"},
       {"/a ⊕ /b", 4, "\"⊕\" is no operator here; write xor"},
       {"/b and active(/a)", 8, "write the name alone"},

@@ -130,6 +130,16 @@ TEST(Defines, MistakesAreReportedAtTheirPlace) {
   }
 }
 
+TEST(Defines, OneInAFileThatComesLaterIsToldWithThatFile) {
+  const Loaded loaded =
+      load_texts({"<behaviors><behavior name='A'><config at='${gaze}'>/s</config></behavior>"
+                  "<source port='${gase}'/></behaviors>",
+                  "<behaviors/>", "<define name=' gaze '>/p</define>"});
+  EXPECT_THAT(loaded.message(0), HasSubstr("${gaze} is used before it is defined, in "));
+  EXPECT_THAT(loaded.message(0), HasSubstr("c.xml; give that file before this one"));
+  EXPECT_THAT(loaded.message(1), HasSubstr("no define has the name \"gase\""));
+}
+
 TEST(Defines, OneThatCannotBeReadDoesNotMakeItsUsesWrong) {
   EXPECT_THAT(load_text(R"(<define name="a">${nowhere}</define>
 <define name="b">${a}</define>

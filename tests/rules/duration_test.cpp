@@ -44,7 +44,7 @@ TEST(Duration, HasMinutesOnACommandLineOnly) {
 
 TEST(Duration, ForeverIsRecognisedWhereItIsMisspelt) {
   for (const char* const text :
-       {"Forever", "FOREVER", "for ever", "foreve", "inf", "infinity", "never"}) {
+       {"Forever", "FOREVER", "for ever", "foreve", "inf", "Inf", "infinity", "never", "-1"}) {
     EXPECT_THAT(parse_duration(text).problem, HasSubstr("; did you mean \"forever\"?")) << text;
   }
   EXPECT_THAT(parse_duration("soon").problem, testing::Not(HasSubstr("did you mean")));
@@ -52,6 +52,23 @@ TEST(Duration, ForeverIsRecognisedWhereItIsMisspelt) {
     EXPECT_THAT(parse_duration(text, {.advice = "leave it out", .takes_forever = false}).problem,
                 testing::EndsWith("is not a whole number with a unit; leave it out"))
         << text;
+  }
+}
+
+TEST(Duration, OfAnotherUnitTheSameInOneOfOursIsTold) {
+  const std::vector<std::pair<std::string, std::string>> cases{
+      {"1h", "has an unknown unit; write 3600s in its place"},
+      {"2sec", "has an unknown unit; write 2s in its place"},
+      {"500MS", "has an unknown unit; write 500ms in its place"},
+      {"10µs", "has an unknown unit; write 10us in its place"},
+      {"500 ms", "has a blank; write 500ms in its place"},
+      {"5 min", "has a blank; write 300s in its place"},
+      {"5 parsecs", "has a blank; write the unit right behind"},
+      {"2305843009213693952h", "has an unknown unit; write a whole number"},
+      {"0h", "has an unknown unit; write a whole number"},
+  };
+  for (const auto& [text, advice] : cases) {
+    EXPECT_THAT(parse_duration(text).problem, HasSubstr(advice)) << text;
   }
 }
 

@@ -300,6 +300,16 @@ TEST(Load, ASourceThatIsSensedMustBelongToAModuleOrAConnection) {
   }
 }
 
+// That the application lacks its connection is an error of its own.
+TEST(Load, ASourceThatTheModelConnectsIsNotReportedAsUnpublished) {
+  const Loaded loaded = load_with_application(
+      "<behavior name='A'><config at='/p'>/a</config></behavior>"
+      "<behavior name='B'><config at='/p'>/b</config><inhibition>A</inhibition></behavior>",
+      "<application><module><name>m</name></module>"
+      "<connection><from>/a</from><to>/p</to></connection></application>");
+  EXPECT_THAT(loaded.findings(true), ElementsAre("a.xml:1:77 error not-in-application"));
+}
+
 // Two programs command one motor, and nothing decides between them.
 TEST(Load, SeveralSourcesAtAPortWithoutRulesAreNoted) {
   const auto load = [](const std::string& connection) {

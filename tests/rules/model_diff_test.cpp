@@ -221,6 +221,7 @@ TEST(ModelDiff, SaysInHowManyStatesWhoWinsInsteadOfWhom) {
       compiled(RulesByHand().port("/p", {{"/low", always()}, {"/high", inactive("/low")}}));
   EXPECT_EQ(text_of(diff(before, after)),
             "/p\n"
+            "  read only before: /stop\n"
             "  decides differently in 3 of 2^3 = 8 states\n"
             "  /high -> /low: 1 state, such as with /high and /low active and /stop inactive\n"
             "  nobody -> /low: 1 state, such as with /high, /low and /stop active\n"
@@ -303,7 +304,8 @@ TEST(ModelDiff, WhatOutgrowsTheBoundsIsLeftOpenAndNotCalledEqual) {
   EXPECT_FALSE(found.differs());
   EXPECT_TRUE(found.is_open());
   EXPECT_EQ(text_of(found),
-            "/p\n  not known: comparing the winners takes more steps than there are for it\n"
+            "/p\n  read only before: /b\n  read only after: /c\n"
+            "  not known: comparing the winners takes more steps than there are for it\n"
             "1 port not compared, for lack of steps (/p)\n");
   EXPECT_FALSE(diff(before, after).is_open());
 }
@@ -349,6 +351,28 @@ TEST(ModelDiff, PortsOfTwoHundredAndFiftySixConnectionsAreCompared) {
   for (const auto& port : found.ports) EXPECT_EQ(port.open, "");
 }
 
+// A misspelt source of a condition stands out.
+TEST(ModelDiff, NamesWhatOnlyOneModelReadsAtAPortThatDiffers) {
+  const auto before = compiled(RulesByHand().port("/p", {{"/a", inactive("/collision")}}));
+  const auto after = compiled(RulesByHand().port("/p", {{"/a", inactive("/colision")}}));
+  const ModelDiff found = diff(before, after);
+  ASSERT_EQ(found.ports.size(), 1u);
+  EXPECT_THAT(found.ports[0].reads_before, testing::ElementsAre("/collision"));
+  EXPECT_THAT(found.ports[0].reads_after, testing::ElementsAre("/colision"));
+  std::ostringstream out;
+  write_text(out, found);
+  EXPECT_THAT(out.str(), testing::HasSubstr("/p\n  read only before: /collision\n"
+                                            "  read only after: /colision\n"));
+  // What becomes connected says so, and nothing else.
+  const auto connected =
+      compiled(RulesByHand().port("/p", {{"/a", inactive("/c")}, {"/c", always()}}));
+  const ModelDiff other =
+      diff(compiled(RulesByHand().port("/p", {{"/a", inactive("/c")}})), connected);
+  ASSERT_EQ(other.ports.size(), 1u);
+  EXPECT_THAT(other.ports[0].connections_after, testing::ElementsAre("/c"));
+  EXPECT_THAT(other.ports[0].reads_before, testing::IsEmpty());
+}
+
 TEST(ModelDiff, WritesJsonForPrograms) {
   const auto before = compiled(RulesByHand().port("/p", {{"/a", always()}}));
   const auto after = compiled(RulesByHand().port("/p", {{"/a", inactive("/b")}}));
@@ -358,8 +382,10 @@ TEST(ModelDiff, WritesJsonForPrograms) {
     "differs": true, "open": false, "summary": "1 of 1 port decides differently (/p)",
     "compared_ports": 1, "timeouts": [],
     "ports": [{"port": "/p", "differs": true,
-      "before": {"exists": true, "arbitrated": true, "conflict": "error", "only_here": []},
-      "after": {"exists": true, "arbitrated": true, "conflict": "error", "only_here": []},
+      "before": {"exists": true, "arbitrated": true, "conflict": "error", "only_here": [],
+                 "read_only_here": []},
+      "after": {"exists": true, "arbitrated": true, "conflict": "error", "only_here": [],
+                "read_only_here": ["/b"]},
       "sources": 2, "states": "1", "of": "4", "all_changes": true, "open": null,
       "changes": [{"before": "/a", "after": null, "states": "1",
                    "example": {"active": ["/a", "/b"], "inactive": [], "shortest": true}}]}]})json";

@@ -281,6 +281,30 @@ TEST(NameChecks, ASourceThatIsAnInputPortIsToldAndTheOtherWayRound) {
               ElementsAre("1:111 warning wrong-end"));
 }
 
+// The one that stands at the wrong end is told, and not proposed for the one that does not.
+TEST(NameChecks, ANameAtTheWrongEndIsNoneThatAnotherMeant) {
+  const Loaded read = load_text(
+      "<behaviors><behavior name='B'><config at='/Arm/pos:i'>/Reach/pos:o</config>\n"
+      "<condition>not /Reach/pos:i</condition></behavior></behaviors>");
+  EXPECT_THAT(read.findings(),
+              testing::UnorderedElementsAre("2:16 warning similar-name", "2:16 warning wrong-end"));
+  const Loaded two = load_condition("not /safety/estop:i and not /safety/estop:o");
+  EXPECT_THAT(two.findings(), ElementsAre("2:16 warning wrong-end"));
+  const Loaded port = load_text(
+      "<behaviors><behavior name='B'><config at='/Gripper/pos:o'>/Reach/pos:o</config></behavior>\n"
+      "<behavior name='C'><config at='/Gripper/pos:i'>/Rest/pos:o</config></behavior></behaviors>");
+  EXPECT_THAT(port.findings(), ElementsAre("1:43 warning wrong-end"));
+}
+
+TEST(NameChecks, ADeclarationToCopyIsXml) {
+  const Loaded read = load_text(
+      "<behaviors><source port='/R&amp;D/estop:o'/><behavior name='B'>"
+      "<config at='/Arm/pos:i'>/Reach/pos:o</config>\n"
+      "<condition>not \"/R&amp;D/estop:o\" and not \"/R&amp;D/estpo:o\"</condition>"
+      "</behavior></behaviors>");
+  EXPECT_THAT(read.message(), HasSubstr("with <source port=\"/R&amp;D/estpo:o\"/>"));
+}
+
 TEST(NameChecks, LargeModelsOfSiblingsAreQuiet) {
   std::string model = "<behaviors>\n";
   for (int i = 0; i < 60; ++i) {

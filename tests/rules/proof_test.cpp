@@ -10,6 +10,7 @@
 
 #include "rules/prove/compile.hpp"
 #include "rules/prove/witness.hpp"
+#include "tests/rules/model_text.hpp"
 #include "tests/rules/rules_by_hand.hpp"
 #include "tests/support/live_table.hpp"
 #include "tests/support/rounds.hpp"
@@ -169,10 +170,50 @@ TEST(Proof, SaysWhereAndWhenTwoCanWinAndWhatToDo) {
   const auto& conflict = diagnostics.items()[0];
   EXPECT_EQ(conflict.message,
             "/a and /b (model.xml:2:5) can both win at /p when /a and /b are active while /c is "
-            "not; let one inhibit the other, give one a condition that excludes the other, or let "
-            "document order decide with <arbiter at=\"/p\" conflict=\"first\"/>");
+            "not; give one a condition that excludes the other, or let document order decide with "
+            "<arbiter at=\"/p\" conflict=\"first\"/>");
   EXPECT_THAT(conflict.witness->active, ElementsAre("/a", "/b"));
   EXPECT_THAT(conflict.witness->inactive, ElementsAre("/c"));
+}
+
+// Only siblings may inhibit each other, and nobody itself.
+TEST(Proof, SaysWhichInhibitionWouldHelp) {
+  const auto advice_in = [](const std::string& model) {
+    const rules::Loaded loaded = rules::load_text("<behaviors>" + model + "</behaviors>");
+    Diagnostics diagnostics;
+    compile(loaded.rules, diagnostics);
+    const auto& items = diagnostics.items();
+    const std::string message = items.empty() ? "" : items[0].message;
+    const std::size_t at = message.find("; ") + 2;
+    return message.substr(at, message.find(" a condition") - at);
+  };
+  const std::string a = "<behavior name='A'><config at='/p'>/a</config></behavior>";
+  const std::string b = "<behavior name='B'><config at='/p'>/b</config></behavior>";
+  const auto box = [](const std::string& name, const std::string& child) {
+    return "<meta_behavior name='" + name + "'><behavior>" + child + "</behavior></meta_behavior>";
+  };
+  EXPECT_EQ(advice_in(a + b), "let one inhibit the other, give one");
+  EXPECT_EQ(advice_in(a + b +
+                      "<meta_behavior name='M'><behavior>A</behavior><behavior>B</behavior>"
+                      "</meta_behavior>"),
+            "let one inhibit the other, give one");
+  EXPECT_EQ(advice_in(a + b + box("M", "B")),
+            "let \"A\" inhibit \"M\" or the other way round, give one");
+  EXPECT_EQ(advice_in(a + b + box("M", "B") + box("Outer", "M") + box("N", "A")),
+            "let \"N\" inhibit \"Outer\" or the other way round, give one");
+  EXPECT_EQ(advice_in("<behavior name='A'><config at='/p'>/a</config><config at='/p'>/b</config>"
+                      "</behavior>"),
+            "give each a behaviour of its own in place of \"A\" and let one inhibit the other, "
+            "give one");
+  EXPECT_EQ(advice_in(a + "<arbiter at='/p'><select from='/b'/></arbiter>"), "give one");
+}
+
+TEST(Proof, WhatIsToBeCopiedIsXml) {
+  Diagnostics diagnostics;
+  compile(RulesByHand().port("/p&q", {{"/b", always()}, {"/a", always()}}), diagnostics);
+  ASSERT_EQ(diagnostics.items().size(), 1u);
+  EXPECT_THAT(diagnostics.items()[0].message,
+              testing::EndsWith("<arbiter at=\"/p&amp;q\" conflict=\"first\"/>"));
 }
 
 // Each path through the diagram begins with a decision on the selector /s, which comes first in it;

@@ -90,6 +90,7 @@ TEST(Xml, MalformedIsReportedWhereItBeginsToBe) {
       {"<a> < </a>", "1:5", "write &lt;"},
       {"<a>1 <2</a>", "1:6", "write &lt;"},
       {"<a/><", "1:5", "write &lt;"},
+      {"<a>/x <-> /y</a>", "1:7", "write iff for this operator"},
       {"<a/>\n<!-- b", "2:1", "close it with -->"},
       {"<a><![CDATA[b", "1:4", "close it with ]]>"},
       {"<?xml version='1.0'", "1:1", "close it with ?>"},
