@@ -290,12 +290,18 @@ class PortFindings {
     if (!shortest) return false;
     shortest->is_shortest = is_known;
     const std::string others = enumerate(names);
+    // Not where it lets both win: where y wins by something else than z.
+    const bool is_enough = winners_->given(y.wins, z, !lacks_z).is_false();
+    const std::string condition = is_enough
+                                      ? ": \"not " + by + (lacks_z ? " or not " : " or ") + z + '"'
+                                      : " that fails only where " + by + " wins";
     diagnostics_.note("starved", where_of(by),
                       "at " + port_.port + ", " + by + " silences " + others + " even while " +
                           (lacks_z ? by + " cannot win for want of " + z : z + " silences " + by) +
                           ": with " + in_words(*shortest) + ", nobody wins; if " + would_win +
-                          " should win then, let no inhibition but its condition \"not " + by +
-                          (lacks_z ? " or not " : " or ") + z + "\" keep it out",
+                          " should win then, replace the inhibition by a further condition of its "
+                          "behaviour" +
+                          condition,
                       {.ports = {port_.port}, .source = by}, *shortest);
     return true;
   }

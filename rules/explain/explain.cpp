@@ -238,14 +238,13 @@ class PortInquiry {
     part.causes.push_back(std::move(cause));
   }
 
-  // Which sources inhibit. The connection's own is enough, where it is one of them and active, or
-  // none of the others is.
+  // Which sources inhibit. The connection's own is enough, where it is one of them.
   void add_voices(const Voices& voices, std::size_t inhibitor, bool is_own_a_voice, Cause& cause) {
     for (const Voice& voice : voices.active) {
       if (*voice.source == *own_) continue;
       cause.also.push_back(*voice.source);
     }
-    if (is_own_a_voice && (is_own_active_ || cause.also.empty())) {
+    if (is_own_a_voice) {
       note_own_activity(cause);
     } else {
       const auto winner =

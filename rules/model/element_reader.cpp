@@ -48,11 +48,13 @@ bool contains(KnownNames names, std::string_view name) {
 std::string_view advice_on(std::string_view attribute, std::string_view element, KnownNames known) {
   if (attribute == "timeout" || attribute == "time") {
     if (contains(known, "timeout")) return "did you mean timeout?";
-    return "a source has one: write <source port=\"…\" timeout=\"…\"/> beside the behaviours";
+    return "a source has one: write <source port=\"…\" timeout=\"…\"/> beside the behaviours of "
+           "the "
+           "model";
   }
   if (attribute == "priority") {
-    return "name those that it keeps out in an <inhibition>, or write <arbiter at=\"…\" "
-           "conflict=\"first\"/>, so that the first in the file wins";
+    return "in the model name those that a behaviour keeps out in its <inhibition>, or write "
+           "<arbiter at=\"…\" conflict=\"first\"/>, so that the first in the file wins";
   }
   if (element == "config" && attribute == "from") {
     return "write the output port between the tags: <config at=\"…\">…</config>";

@@ -121,8 +121,9 @@ class NameCheck {
                          "the name " + name + " stands only here" + origin_of(use) +
                              ", and nothing declares it; did you mean " + std::string(meant) +
                              ", as at " + describe(other.where) + origin_of(other) +
-                             "? If both are right, declare this one with <" + element_ + "=\"" +
-                             escape_xml(name) + "\"/>");
+                             "? If both are right, declare " +
+                             (is_vouched_for(other) ? "this one" : "both, this one") + " with <" +
+                             element_ + "=\"" + escape_xml(name) + "\"/>");
   }
 
   const NameUses& uses_;

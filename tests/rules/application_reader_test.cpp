@@ -56,7 +56,8 @@ TEST(Application, WarnsOfAMisspeltElement) {
 // YARP's own, what a module has beside its own, and short words that differ in a letter.
 TEST(Application, PassesOverWhatIsNoMisspeltElement) {
   const Loaded loaded = load_with_application(
-      kModel, "<application><name>a</name><description/><authors/>" + connection("/s", "/p") +
+      kModel, "<application><name>a</name><description/><authors/><arbitrator/>" +
+                  connection("/s", "/p") +
                   "<module><name>m</name><note>n</note><names/><rank>1</rank><mode/></module>"
                   "</application>");
   EXPECT_THAT(loaded.findings(), IsEmpty()) << loaded.message();

@@ -152,18 +152,6 @@ TEST_F(Explained, AnInhibitionByItsOwnSourceIsToldBeforeItIsActive) {
   EXPECT_THAT(only_cause(shared).because, IsEmpty());
 }
 
-TEST_F(Explained, AnInhibitionByAnotherSourceIsToldBeforeThatOfItsOwn) {
-  const auto shared = connection(R"(<behaviors><arbiter at="/p" conflict="first"/>
-<behavior name="A"><config at="/p">/s</config><config at="/p">/t</config><inhibition>B</inhibition></behavior>
-<behavior name="B"><config at="/p">/s</config><config at="/p">/u</config></behavior>
-</behaviors>)",
-                                 "/s", {"/t"});
-  const auto& causes = shared.parts.at(1).causes;
-  ASSERT_EQ(causes.size(), 1U);
-  EXPECT_EQ(causes[0].own_activity, Cause::OwnActivity::kNoMatter);
-  EXPECT_THAT(said(causes[0].because), ElementsAre("/t"));
-}
-
 TEST_F(Explained, WhatIsInactiveIsToldOfTheEarlierOneThatWouldWinAllTheSame) {
   const std::string model = R"(<behaviors><arbiter at="/p" conflict="first">
 <select from="/high">/go</select><select from="/yields">not /low</select>

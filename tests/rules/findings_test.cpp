@@ -72,16 +72,26 @@ TEST(Findings, NameAShortestStateWithoutAWinnerAndItsPlace) {
   EXPECT_THAT(others[1].active, ElementsAre("/low", "/off"));
   EXPECT_EQ(found.items[1].message,
             "at /p, /high silences /low even while /stop silences /high: with /high, /low and "
-            "/stop active and /off inactive, nobody wins; if /low should win then, let no "
-            "inhibition but its condition \"not /high or /stop\" keep it out");
+            "/stop active and /off inactive, nobody wins; if /low should win then, replace the "
+            "inhibition by a further condition of its behaviour: \"not /high or /stop\"");
   EXPECT_EQ(found.items[1].where.line, 3u);
 }
 
+TEST(Findings, ProposeNoConditionWithWhichBothCouldWin) {
+  const auto found = found_in(RulesByHand().port(
+      "/p", {{"/low", inactive("/high")}, {"/high", any_of({active("/one"), active("/other")})}}));
+  ASSERT_THAT(found.codes(), Contains("starved"));
+  for (const auto& item : found.items) {
+    if (item.code != "starved") continue;
+    EXPECT_THAT(item.message, HasSubstr("behaviour that fails only where /high wins"));
+  }
+}
+
 TEST(Findings, NameOfThoseSilencedTheOneThatTheStateIsAbout) {
-  const auto found = found_in(
-      RulesByHand().port("/p", {{"/far", all_of({inactive("/high"), active("/a"), active("/b")})},
-                                {"/near", inactive("/high")},
-                                {"/high", inactive("/stop")}}));
+  const auto found = found_in(RulesByHand().port(
+      "/p", {{"/far", all_of({inactive("/high"), active("/a"), inactive("/near")})},
+             {"/near", inactive("/high")},
+             {"/high", inactive("/stop")}}));
   ASSERT_THAT(found.codes(), Contains("starved"));
   EXPECT_THAT(
       found.items.back().message,
@@ -95,8 +105,9 @@ TEST(Findings, NameWhoSilencesOthersWhileItsConditionFails) {
   ASSERT_THAT(found.codes(), ElementsAre("nobody-wins", "starved"));
   EXPECT_EQ(found.items[1].message,
             "at /p, /high silences /low even while /high cannot win for want of /enable: with "
-            "/high and /low active and /enable inactive, nobody wins; if /low should win then, let "
-            "no inhibition but its condition \"not /high or not /enable\" keep it out");
+            "/high and /low active and /enable inactive, nobody wins; if /low should win then, "
+            "replace the inhibition by a further condition of its behaviour: \"not /high or not "
+            "/enable\"");
   EXPECT_EQ(found.items[1].where.line, 3u);
 }
 
