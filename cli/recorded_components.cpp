@@ -45,7 +45,8 @@ Publishers Owners::of(const Reign& reign) const {
   const std::size_t end = first_from(&Ownership::since, reign.end);
   const bool has_first = first < all_.size() && (first < end || begins_itself);
   Publishers found;
-  if (first != 0 && (!has_first || (first >= next && !begins_itself))) {
+  // Who had closed it before it arrived is not who let it arrive.
+  if (first != 0 && !begins_itself && (!has_first || first >= next)) {
     found.first.push_back(all_[first - 1].opening);
   }
   if (has_first) found.first.push_back(all_[first].opening);

@@ -182,6 +182,8 @@ TEST(RecordedWinners, SaysWhoseTheWinnerWas) {
   tell(What::closed, "/low", "nav", 22, 8 * kSecond);
   tell(What::opened, "/low", "nav", 33, 8 * kSecond);
   win("/unknown", 9 * kSecond, Why::expiry, "/low");
+  tell(What::closed, "/low", "nav", 33, 9 * kSecond + 1);
+  win("/low", 9 * kSecond + 2, Why::arrival, "/low");  // of one that nobody saw open it
   const std::string file = incident.file(10 * kSecond);
   std::vector<std::string> words;
   std::istringstream lines(arbiter({"recording", "winners", file}).out);
@@ -192,7 +194,7 @@ TEST(RecordedWinners, SaysWhoseTheWinnerWas) {
   EXPECT_THAT(words, testing::ElementsAre(
                          "/low of nav (pid 11)", "/high from host base", "/low of nav (pid 11)",
                          "idle", "/low of nav (pid 22)", "/high from host base",
-                         "/low of nav (pid 22), then of nav (pid 33)", "/unknown"));
+                         "/low of nav (pid 22), then of nav (pid 33)", "/unknown", "/low"));
   const auto found = nlohmann::json::parse(arbiter({"recording", "winners", "--json", file}).out);
   EXPECT_EQ(found[0]["components"],
             nlohmann::json::parse(R"([{"node": "nav", "pid": 11, "host": null}])"));
