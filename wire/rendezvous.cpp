@@ -169,7 +169,8 @@ void pass_over(const std::string& directory, const std::string& file, const char
 
 // Who listens at that file of the directory, if it is trusted. `who`: "daemon", "link".
 std::optional<shm::FileDescriptor> connect_in(const std::string& directory, const std::string& file,
-                                              const char* who, std::string& why_not, int mode = 0) {
+                                              const char* who, std::string& why_not, int mode = 0,
+                                              bool* is_full = nullptr) {
   // Not even connected to: who listens there could let nobody in, for a second each time.
   if (const auto stranger = stranger_who_owns(directory)) {
     char why[112];
@@ -184,6 +185,7 @@ std::optional<shm::FileDescriptor> connect_in(const std::string& directory, cons
   const Address at = address_of(directory, file);
   const auto* address = reinterpret_cast<const sockaddr*>(&at.address);
   if (connect(socket.get(), address, sizeof at.address) != 0) {
+    if (is_full != nullptr) *is_full = errno == EAGAIN;
     pass_over(directory, file, why_not_connected(errno), why_not);
     return {};
   }
@@ -324,14 +326,17 @@ std::optional<shm::FileDescriptor> connect_to_daemon(const std::string& instance
                                                      std::string& why_not, std::string* found_in,
                                                      int mode) {
   why_not.clear();
+  bool is_full = false;  // it is there, and lets others in first
   const auto try_in = [&](const std::string& directory) {
-    auto socket = connect_in(directory, instance + kSocketEnding, "daemon", why_not, mode);
+    auto socket =
+        connect_in(directory, instance + kSocketEnding, "daemon", why_not, mode, &is_full);
     if (socket && found_in != nullptr) *found_in = directory;
     return socket;
   };
   const std::vector<std::string> usual = usual_directories();
   for (const std::string& directory : usual) {
     if (auto socket = try_in(directory)) return socket;
+    if (is_full) return {};
   }
   const auto last = last_directory();
   const bool is_new = last && std::find(usual.begin(), usual.end(), *last) == usual.end();

@@ -12,11 +12,15 @@
 #include <utility>
 
 #include "client/node/node_core.hpp"
+#include "shm/clock.hpp"
 
 namespace arbiter::detail {
 namespace {
 
 using Descriptors = Outbox::Descriptors;
+
+// How long a node with too many descriptors under way keeps to one conversation.
+constexpr shm::Nanoseconds kMostHandBack = 1'000'000'000;
 
 template <class Core>
 void put_port_into_words(const Core& core, std::uint32_t id, const shm::FileDescriptor& second,
@@ -113,6 +117,8 @@ void NodeCore::say_what_is_due() noexcept {
           break;
         case wire::SendResult::kTooMany:
           due_has_too_many_ = true;
+          // What nodes that hand back have not read yet may be what is too many.
+          if (hands_back() && shm::monotonic_now() - asked_ > kMostHandBack) lose_daemon();
           return;
         case wire::SendResult::kFull:
           return;

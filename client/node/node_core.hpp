@@ -110,7 +110,7 @@ class NodeCore : public std::enable_shared_from_this<NodeCore> {
     std::string source;
     shm::FileDescriptor page;
   };
-  // kRejoining: a daemon has been handed back everything, and has not answered yet.
+  // kRejoining: a daemon is handed back everything, or has been and has not answered yet.
   enum class Standing : std::uint8_t { kMember, kRejoining, kAlone };
 
   void connect();
@@ -167,6 +167,7 @@ class NodeCore : public std::enable_shared_from_this<NodeCore> {
   // Activity pages, and tables (pages.cpp).
   void add_page(wire::Received& received);
   void note_missed(const std::string& source, const std::string& why);
+  void forget_missed(shm::SourceId source, shm::PageNumber number);
   void try_missed_pages();
   void make_tables_resident();
   void hear_of_growth(const wire::Message& message);

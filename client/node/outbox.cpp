@@ -44,10 +44,11 @@ bool Outbox::keep(const wire::Message& message, Descriptors descriptors) noexcep
 
 // A daemon's own number is in the answer to it.
 bool Outbox::withdraw(std::uint64_t request) noexcept {
-  return std::erase_if(waiting_, [&](const Waiting& each) {
-           return each.message.request == request &&
-                  each.message.kind != wire::MessageKind::kSynced;
-         }) != 0;
+  const auto withdrawn = std::erase_if(waiting_, [&](const Waiting& each) {
+    return each.message.request == request && each.message.kind != wire::MessageKind::kSynced;
+  });
+  if (waiting_.empty()) has_too_many_ = false;
+  return withdrawn != 0;
 }
 
 void Outbox::flush(int socket) noexcept {

@@ -28,19 +28,27 @@ void NodeCore::add_page(wire::Received& received) {
     if (!memory_->pages().has(message.id, message.value)) {
       note_missed(source, error.what());
       if (!page) return;
-      if (missed_pages_.empty()) try_pages_at_ = shm::monotonic_now() + kTryPagesInterval;
+      if (missed_pages_.empty()) {
+        try_pages_at_ = shm::monotonic_now() + kTryPagesInterval;
+        service_bell_->ring();  // whoever waits in the loop does not know of it
+      }
+      forget_missed(key.first, key.second);
       missed_pages_.insert_or_assign(key, MissedPage{std::move(source), std::move(page)});
       shm::close_in_children(missed_pages_.at(key).page);
       return;
     }
     say_not_locked(0, error.what());
   }
-  // Nobody needs the one before the last any more.
-  std::erase_if(missed_pages_, [&](const auto& each) {
-    return each.first == key ||
-           (each.first.first == message.id && each.first.second + 1 < message.value);
-  });
+  forget_missed(key.first, key.second);
   wake_inputs();
+}
+
+// This page of the source, and those before the last, which nobody needs any more.
+void NodeCore::forget_missed(shm::SourceId source, shm::PageNumber number) {
+  std::erase_if(missed_pages_, [&](const auto& each) {
+    const auto& [its_source, its_number] = each.first;
+    return its_source == source && (its_number == number || its_number + 1 < number);
+  });
 }
 
 void NodeCore::try_missed_pages() {

@@ -119,6 +119,7 @@ void NodeCore::be_welcomed(wire::Received& welcome) {
   describe_again();
   reopen_taps();
   say_what_waits();
+  if (has_too_many()) service_bell_->ring();  // as say()
   news_.notify_all();
 }
 

@@ -9,10 +9,13 @@ namespace arbiter::detail {
 
 void NodeCore::say(const wire::Message& message, Outbox::Descriptors descriptors) noexcept {
   if (socket_ == nullptr) return;
+  const bool had_too_many = has_too_many();
   const bool is_said = due_.empty() ? outbox_.send(socket_->get(), message, descriptors)
                                     : outbox_.keep(message, descriptors);
   if (!is_said) return lose_daemon();
   heed();
+  // Room is no news then, and whoever waits in the loop does not know when to try again.
+  if (has_too_many() && !had_too_many) service_bell_->ring();
 }
 
 void NodeCore::say_what_waits() noexcept {
