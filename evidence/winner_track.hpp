@@ -1,8 +1,8 @@
 // Who wins at each input port, from event to event: told by the rules and by what arrives, is
 // deactivated, and ends.
 //
-// Events come in the order of their times. One that comes late counts from then on; the changes of
-// winner that it makes are told for the time that the track had reached.
+// Events come in the order of their times. One that comes late counts from its own time on, unless
+// something else has mattered at the port since: then from that on.
 #pragma once
 
 #include <cstddef>

@@ -148,13 +148,12 @@ bool Link::has_network_changed() {
   return true;
 }
 
-// To join again is silence for a while. Where as many hosts are there as have names, they have
-// found this one, or each other.
-std::string Link::change_of_peers() {
+// To join again is silence for a while. Where as many hosts are there as are looked for, they have
+// found this one, or each other; but one of them may be another, or about to be lost.
+std::string Link::change_of_peers() const {
   std::string change = peers_.change();
-  if (change.empty() || desk_->others().cards.size() < peers_.size()) return change;
-  peers_.accept();
-  return {};
+  const bool are_all_there = desk_->others().cards.size() >= options_.network.peers.size();
+  return are_all_there ? std::string() : change;
 }
 
 void Link::say_what_passes() {

@@ -83,7 +83,7 @@ class Link {
   // True, and said: the network has to be joined again.
   [[nodiscard]] bool has_network_changed();
   // What has become of names of hosts that are missing; empty: nothing.
-  [[nodiscard]] std::string change_of_peers();
+  [[nodiscard]] std::string change_of_peers() const;
   // Once, when it is known.
   void say_what_passes();
   // Where the daemon does not know what this link has open: closes it. A node that has nothing open

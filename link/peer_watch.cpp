@@ -123,9 +123,4 @@ std::string PeerWatch::change() const {
   return shared_->addresses.change(shm::monotonic_now());
 }
 
-std::size_t PeerWatch::size() const {
-  const std::lock_guard lock(shared_->mutex);
-  return shared_->addresses.size();
-}
-
 }  // namespace arbiter::link

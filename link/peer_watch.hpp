@@ -6,7 +6,6 @@
 // are looked up now and then, on a thread: a name server may be silent for long.
 #pragma once
 
-#include <cstddef>
 #include <map>
 #include <memory>
 #include <set>
@@ -28,7 +27,6 @@ class PeerAddresses {
   // nobody knows which one DDS uses: it has changed once it has none of those that it had. A minute
   // passes between two changes: a name may lead elsewhere each time that somebody asks.
   [[nodiscard]] std::string change(shm::Nanoseconds now) const;
-  [[nodiscard]] std::size_t size() const { return places_.size(); }
 
  private:
   struct Place {
@@ -55,8 +53,6 @@ class PeerWatch {
 
   void accept();
   [[nodiscard]] std::string change() const;
-  // Names.
-  [[nodiscard]] std::size_t size() const;
 
  private:
   struct Shared;
