@@ -8,7 +8,7 @@ namespace arbiter::rules {
 
 std::string ConflictAdvice::inhibition(const std::vector<std::size_t>& one,
                                        const std::vector<std::size_t>& other) {
-  const std::string plain = "let one inhibit the other";
+  const char* const plain = "let one inhibit the other";
   if (one.empty() || other.empty()) return {};
   if (one.size() > 1 || other.size() > 1) return plain;
   if (one == other) {
