@@ -8,6 +8,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "link/desk.hpp"
 #include "link/desk_topics.hpp"
 #include "link/host_status.hpp"
 #include "shm/clock.hpp"

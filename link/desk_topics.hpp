@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "gateway/core/bridge.hpp"
+#include "link/core/host_card.hpp"
 #include "link/core/pulse.hpp"
 #include "link/core/questions.hpp"
 #include "link/core/topic_names.hpp"
