@@ -96,9 +96,12 @@ const std::string* Defines::look_up(const std::string& name, const Text& text, s
 std::string_view Defines::later_file_with(std::string_view name) const {
   constexpr std::string_view kTag = "<define";
   for (const auto& [path, content] : later_) {
+    std::size_t end = 0;
     for (std::size_t at = content.find(kTag); at != std::string_view::npos;
-         at = content.find(kTag, at + 1)) {
-      const std::string_view tag = content.substr(at, content.find('>', at) - at);
+         at = content.find(kTag, end)) {
+      end = content.find('>', at);
+      if (end == std::string_view::npos) break;
+      const std::string_view tag = content.substr(at, end - at);
       const std::size_t quoted = tag.find_first_of("\"'");
       if (quoted == std::string_view::npos) continue;
       const std::string_view rest = tag.substr(quoted + 1);

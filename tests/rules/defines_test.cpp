@@ -140,6 +140,13 @@ TEST(Defines, OneInAFileThatComesLaterIsToldWithThatFile) {
   EXPECT_THAT(loaded.message(1), HasSubstr("no define has the name \"gase\""));
 }
 
+TEST(Defines, AreLookedForInALaterFileWithoutEndInOnePass) {
+  std::string endless;
+  for (int i = 0; i < 1'000'000; ++i) endless += "<define ";
+  const Loaded loaded = load_texts({"<source port='${gaze}'/>", endless});
+  EXPECT_THAT(loaded.message(0), HasSubstr("no define has the name \"gaze\""));
+}
+
 TEST(Defines, OneThatCannotBeReadDoesNotMakeItsUsesWrong) {
   EXPECT_THAT(load_text(R"(<define name="a">${nowhere}</define>
 <define name="b">${a}</define>
