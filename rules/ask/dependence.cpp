@@ -35,9 +35,7 @@ bool Dependence::ask(const CompiledRule& rule, const std::string& other, bool ac
     wins_ = winners_->winner(port_, rule);
     of_ = &rule;
   }
-  const Diagram as_it_is = winners_->given(wins_, other, active);
-  return !winners_->combine(Connective::kAndNot, as_it_is, winners_->given(wins_, other, !active))
-              .is_false();
+  return winners_->needs(wins_, other, active);
 }
 
 }  // namespace arbiter::rules

@@ -92,13 +92,7 @@ bool NegationPlaces::depends(const ExpressionPtr& condition, const std::string& 
     const std::string nobody;  // as the connection's own source, which is of no interest
     rules.mention(nobody);
     const Diagram holds = rules.rule({nobody, condition, {}, {}});
-    const Diagram active = builder.when(holds, rules.variable(source));
-    const Diagram inactive = builder.when_not(holds, rules.variable(source));
-    const bool is_active = asked == Asked::kActive;
-    return !builder
-                .combine(Connective::kAndNot, is_active ? active : inactive,
-                         is_active ? inactive : active)
-                .is_false();
+    return builder.needs(holds, rules.variable(source), asked == Asked::kActive);
   } catch (const DiagramLimit&) {
     return true;
   }

@@ -238,6 +238,12 @@ Diagram DiagramBuilder::when_not(const Diagram& a, int variable) {
   return restrict(a, variable, false);
 }
 
+bool DiagramBuilder::needs(const Diagram& function, int variable, bool value) {
+  const Diagram is = value ? when(function, variable) : when_not(function, variable);
+  const Diagram is_not = value ? when_not(function, variable) : when(function, variable);
+  return !combine(Connective::kAndNot, is, is_not).is_false();
+}
+
 Diagram DiagramBuilder::choose(int variable, const Diagram& high, const Diagram& low) {
   const Diagram condition = this->variable(variable);
   return combine(Connective::kOr, combine(Connective::kAnd, condition, high),

@@ -86,6 +86,9 @@ class DiagramBuilder {
   [[nodiscard]] Diagram negate(const Diagram& a);
   [[nodiscard]] Diagram when(const Diagram& a, int variable);  // `variable` taken as true
   [[nodiscard]] Diagram when_not(const Diagram& a, int variable);
+  // Whether in some state the function is true, and would not be if only the variable were not what
+  // `value` says.
+  [[nodiscard]] bool needs(const Diagram& function, int variable, bool value);
   // `high` where the variable is true, `low` where it is not.
   [[nodiscard]] Diagram choose(int variable, const Diagram& high, const Diagram& low);
   // Looks for an order of the variables that makes all living diagrams together smaller.

@@ -53,6 +53,11 @@ class Winners {
   Diagram holds(const CompiledRule& rule);
   // The function in the states that differ from each one only in that the source is (not) active.
   Diagram given(const Diagram& function, const std::string& source, bool active);
+  // Whether in some state the function is true, and would not be if only the source were not
+  // (in)active.
+  bool needs(const Diagram& function, const std::string& source, bool active) {
+    return builder_.needs(function, variables_.at(source), active);
+  }
 
   // A shortest conjunction that implies the function, which can be true; or, where the search for
   // it takes too long, one of which no literal can be left out. That one may be found beyond the
