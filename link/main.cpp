@@ -86,17 +86,9 @@ bool is_port(const std::string& text) {
 // Why no address of it is known that links can use: an error of getaddrinfo(); 0: one is. DDS takes
 // ADDRESS:PORT, too.
 int find_no_address(const std::string& peer) {
-  const std::size_t colon = peer.find(':');
-  const bool has_port = colon != std::string::npos && colon == peer.rfind(':');
-  if (has_port && !is_port(peer.substr(colon + 1))) return EAI_NONAME;
-  addrinfo hints{};
-  hints.ai_family = AF_INET;
-  hints.ai_socktype = SOCK_DGRAM;
-  addrinfo* found = nullptr;
-  const std::string host = has_port ? peer.substr(0, colon) : peer;
-  const int error = host.empty() ? EAI_NONAME : getaddrinfo(host.c_str(), nullptr, &hints, &found);
-  if (error == 0) freeaddrinfo(found);
-  return error;
+  const std::string host = host_of_peer(peer);
+  if (host.size() != peer.size() && !is_port(peer.substr(host.size() + 1))) return EAI_NONAME;
+  return host.empty() ? EAI_NONAME : look_up(host).error;
 }
 
 // Throws CLI::ValidationError. A name server that cannot be asked now is no wrong use: the network

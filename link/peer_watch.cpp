@@ -23,26 +23,27 @@ namespace {
 constexpr std::chrono::seconds kBetweenLooks{5};
 constexpr shm::Nanoseconds kBetweenChanges = 60'000'000'000;
 
-std::set<std::string> look_up(const std::string& name) {
+}  // namespace
+
+LookedUp look_up(const std::string& host) {
   addrinfo hints{};
   hints.ai_family = AF_INET;
   hints.ai_socktype = SOCK_DGRAM;
   addrinfo* list = nullptr;
-  if (::getaddrinfo(name.c_str(), nullptr, &hints, &list) != 0) return {};
+  LookedUp found;
+  found.error = ::getaddrinfo(host.c_str(), nullptr, &hints, &list);
+  if (found.error != 0) return found;
   const std::unique_ptr<addrinfo, void (*)(addrinfo*)> owned(list, ::freeaddrinfo);
-  std::set<std::string> addresses;
   for (const addrinfo* each = list; each != nullptr; each = each->ai_next) {
     std::array<char, INET_ADDRSTRLEN> text{};
     const auto* const to = reinterpret_cast<const sockaddr_in*>(each->ai_addr);
     ::inet_ntop(AF_INET, &to->sin_addr, text.data(), text.size());
-    addresses.insert(text.data());
+    found.addresses.insert(text.data());
   }
-  return addresses;
+  return found;
 }
 
-}  // namespace
-
-// The first answer is what DDS has had, too.
+// The first answer is taken for what DDS has had.
 void PeerAddresses::note(const std::string& name, std::set<std::string> addresses) {
   const auto [place, is_first] = places_.try_emplace(name, Place{addresses, addresses});
   if (!is_first && !addresses.empty()) place->second.now = std::move(addresses);
@@ -69,8 +70,13 @@ std::string PeerAddresses::change_of_any() const {
   return {};
 }
 
+std::string host_of_peer(const std::string& peer) {
+  const std::size_t colon = peer.find(':');
+  return colon == peer.rfind(':') ? peer.substr(0, colon) : peer;
+}
+
 std::string name_of_peer(const std::string& peer) {
-  const std::string host = peer.substr(0, peer.find(':'));
+  const std::string host = host_of_peer(peer);
   in_addr ignored{};
   return ::inet_aton(host.c_str(), &ignored) != 0 ? "" : host;
 }
@@ -84,7 +90,7 @@ struct PeerWatch::Shared {
   void look_for_ever(const std::vector<std::string>& names) {
     for (;;) {
       for (const std::string& name : names) {
-        auto found = look_up(name);
+        auto found = look_up(name).addresses;
         const std::lock_guard lock(mutex);
         if (ends) return;
         addresses.note(name, std::move(found));

@@ -39,7 +39,16 @@ class PeerAddresses {
   shm::Nanoseconds quiet_until_ = 0;
 };
 
-// Of ADDRESS, NAME, or either with :PORT: the name; empty: it is an address.
+struct LookedUp {
+  int error = 0;                    // of getaddrinfo()
+  std::set<std::string> addresses;  // of IPv4, as links use them
+};
+// Waits for a name server.
+[[nodiscard]] LookedUp look_up(const std::string& host);
+
+// Of ADDRESS, NAME, or either with :PORT: what stands before the port. An IPv6 address as it is.
+[[nodiscard]] std::string host_of_peer(const std::string& peer);
+// The same, if it is a name; empty: it is an address.
 [[nodiscard]] std::string name_of_peer(const std::string& peer);
 
 // As PeerAddresses has it, without waiting. Thread safety: any thread.
