@@ -9,10 +9,9 @@
 namespace arbiter::cli {
 
 // The daemon's report on the change, which may be a refusal. Writes the report to standard output
-// (`json`, with the open
-// ports that the model does not mention), or what was found in files, and why the change is
-// refused, to standard error. Throws wire::CallError where there is no daemon, or it does not allow
-// it.
+// (`json`, with the open ports that the model does not mention), or what was found in files, and
+// why the change is refused, to standard error. Throws wire::CallError where there is no daemon, or
+// it does not allow it.
 wire::ChangeReport ask_for_change(const std::string& verb, const std::string& instance,
                                   wire::Message question, bool json);
 

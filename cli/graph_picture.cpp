@@ -20,6 +20,7 @@
 #include "drawing/graphviz.hpp"
 #include "drawing/only_ports.hpp"
 #include "rules/ask/report.hpp"
+#include "rules/text/names.hpp"
 
 namespace arbiter::cli {
 namespace {
@@ -42,9 +43,7 @@ std::string format_of(const GraphOptions& options) {
   std::string ending = fs::path(options.output).extension().string();
   if (ending.empty()) return "svg";
   ending.erase(0, 1);
-  for (char& each : ending) {
-    each = static_cast<char>(std::tolower(static_cast<unsigned char>(each)));
-  }
+  ending = rules::lower_case(ending);
   if (ending == "gv") return "dot";
   if (is_known(ending)) return ending;
   throw CLI::ValidationError("--output", "no picture is made of the ending of " + options.output +

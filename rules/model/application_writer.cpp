@@ -9,6 +9,7 @@
 
 #include "rules/model/print_rules.hpp"
 #include "rules/text/duration.hpp"
+#include "rules/text/names.hpp"
 #include "rules/text/xml.hpp"
 #include "shm/utf8.hpp"
 
@@ -24,18 +25,12 @@ struct Style {
   bool is_utf8 = true;
 };
 
-std::string lower_case(std::string text) {
-  std::transform(text.begin(), text.end(), text.begin(),
-                 [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c + 32) : c; });
-  return text;
-}
-
 // Whether text can be put in as UTF-8. The declaration, if there is one, comes first.
 bool is_utf8(std::string_view content) {
   const bool has_declaration = content.starts_with("<?xml");
   const std::string_view start = content.substr(0, has_declaration ? content.find("?>") : 0);
   if (const std::size_t at = start.find("encoding"); at != std::string_view::npos) {
-    const std::string declared = lower_case(std::string(start.substr(at, 20)));
+    const std::string declared = lower_case(start.substr(at, 20));
     if (declared.find("utf-8") == std::string::npos) return false;
   }
   for (std::size_t i = 0; i < content.size();) {

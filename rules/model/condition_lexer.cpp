@@ -116,10 +116,7 @@ bool is_letter_or_digit(char byte) {
 }
 
 [[noreturn]] void fail_at_word(std::size_t at, std::string_view word, Language language) {
-  std::string lower;
-  for (const char byte : word.substr(0, word.find('/'))) {
-    lower += static_cast<char>(std::tolower(static_cast<unsigned char>(byte)));
-  }
+  const std::string lower = lower_case(word.substr(0, word.find('/')));
   std::vector<std::string_view> known;
   std::vector<Spelling> words(kWords.begin(), kWords.end());
   if (language == Language::kStatement) {

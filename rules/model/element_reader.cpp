@@ -49,8 +49,7 @@ std::string_view advice_on(std::string_view attribute, std::string_view element,
   if (attribute == "timeout" || attribute == "time") {
     if (contains(known, "timeout")) return "did you mean timeout?";
     return "a source has one: write <source port=\"…\" timeout=\"…\"/> beside the behaviours of "
-           "the "
-           "model";
+           "the model";
   }
   if (attribute == "priority") {
     return "in the model name those that a behaviour keeps out in its <inhibition>, or write "

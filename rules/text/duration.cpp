@@ -46,15 +46,9 @@ constexpr auto kForeignUnits = std::to_array<ForeignUnit>({{"h", "s", 3600},
                                                            {"μs", "us"},
                                                            {"nsec", "ns"}});
 
-std::string in_small_letters(std::string_view text) {
-  std::string result(text);
-  for (char& each : result) each = each >= 'A' && each <= 'Z' ? static_cast<char>(each + 32) : each;
-  return result;
-}
-
 // "300s" for "5min" and "5 min"; empty: it is no such duration, or too long.
 std::string in_our_units(std::string_view digits, std::string_view written) {
-  std::string unit = in_small_letters(trim(written));
+  std::string unit = lower_case(trim(written));
   shm::Nanoseconds count = 1;
   for (const ForeignUnit& each : kForeignUnits) {
     if (each.spelling != unit) continue;
@@ -109,7 +103,7 @@ ParsedDuration parse_duration(std::string_view text, const DurationWords& words)
   if (lacks_zero) return parse_duration("0" + std::string(text), words);
   const std::size_t digits = text.find_first_not_of("0123456789");
   if (text.empty() || digits == 0) {
-    const std::string word = in_small_letters(text);
+    const std::string word = lower_case(text);
     const bool is_endless =
         word.starts_with("inf") || word == "never" || word == "always" || word == "-1";
     const bool means_forever =

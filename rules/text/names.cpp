@@ -75,6 +75,12 @@ std::string_view trim(std::string_view text) {
   return text;
 }
 
+std::string lower_case(std::string_view text) {
+  std::string result(text);
+  for (char& each : result) each = each >= 'A' && each <= 'Z' ? static_cast<char>(each + 32) : each;
+  return result;
+}
+
 std::string collapse_blanks(std::string_view text) {
   std::string result;
   bool gap = false;

@@ -11,6 +11,8 @@
 namespace arbiter::rules {
 
 std::string_view trim(std::string_view text);
+// Of ASCII, whatever the locale.
+std::string lower_case(std::string_view text);
 
 // Trimmed, and each run of white space inside made one blank.
 std::string collapse_blanks(std::string_view text);
