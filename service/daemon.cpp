@@ -132,7 +132,7 @@ void Daemon::run(int signal_descriptor) {
       changes_.advance();
       give_back_at_ = names_.give_back(now);
     }
-    is_more_to_tell_ = observers_.tell(clients_, switchboard_);
+    is_more_to_tell_ = observers_.tell(clients_, switchboard_, board_.in_force().generation);
     answer_status(now);
     settle();
     if (stop_wanted_) return;

@@ -42,7 +42,7 @@ class Instance {
   Instance& operator=(const Instance&) = delete;
 
   [[nodiscard]] const std::string& name() const noexcept { return caller_.instance; }
-  // Readable when update() has something to do.
+  // Readable when update() has something to do, and when another model has come into force.
   [[nodiscard]] int descriptor() const noexcept { return epoll_.get(); }
   // Takes up what the daemon has said, and looks for another where it has gone, twenty times a
   // second. Does not wait; a daemon that is stopped may hold it up for a second, once.

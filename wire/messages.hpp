@@ -110,6 +110,8 @@ enum class MessageKind : std::uint32_t {
   kTapInput,   // to tap `port` of an input port: peer has that open, name; descriptor: its segment
   kMeasure,    // to input `port`, which is tapped: value 1: count how long samples wait; 0: no more
   kYield,      // to output `port`, which yields: a component asks for its name, once; text: which
+  kModelInForce,  // to an observer: link: the generation of the model that is in force now, and at
+                  // each change; of several the last
 };
 
 enum MessageFlag : std::uint32_t {

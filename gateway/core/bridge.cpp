@@ -18,7 +18,7 @@ namespace arbiter::gateway {
 namespace {
 
 constexpr shm::Nanoseconds kMillisecond = 1'000'000;
-// Between two looks whether another model is in force, of which nobody tells.
+// Between two looks while a port is not open.
 constexpr shm::Nanoseconds kLookPeriod = 100 * kMillisecond;
 constexpr shm::Nanoseconds kTellPeriod = 500 * kMillisecond;  // how things stand
 constexpr int kRetryPeriod = 500;                             // ms, for the daemon
@@ -31,7 +31,7 @@ constexpr shm::Nanoseconds kNoAnswer = 100 * kMillisecond;
 constexpr shm::Nanoseconds kSilence = 400 * kMillisecond;
 // A try that has held up the loop is made again after so many times as long.
 constexpr int kTimesAsLong = 20;
-// In a round of the loop, which goes round ten times a second.
+// In a round of the loop, which goes round ten times a second then.
 constexpr shm::Nanoseconds kOpenBudget = 10 * kMillisecond;
 
 }  // namespace
@@ -246,16 +246,15 @@ void Bridge::loop(int stop) {
   watch(stop, nullptr);
   watch(bell_.descriptor(), &bell_);
   for (bool all = true;;) {
-    look_after(shm::monotonic_now(), all || max_ages_.is_outdated());
+    look_after(shm::monotonic_now(), all);
     serve(shm::monotonic_now(), all);
     all = false;
     const shm::Nanoseconds now = shm::monotonic_now();
-    const auto wait = std::max<shm::Nanoseconds>(0, next_round(now) - now + kMillisecond - 1);
+    const auto wait = std::max<shm::Nanoseconds>(0, next_round() - now + kMillisecond - 1);
     if (!hear(static_cast<int>(wait / kMillisecond), all)) return;
   }
 }
 
-// A round that finds nothing costs little: there are ten in a second.
 void Bridge::look_after(shm::Nanoseconds now, bool all) {
   if (now < tend_at_ && !all) return;
   const bool tells = all || now >= tell_at_;
@@ -276,8 +275,8 @@ void Bridge::look_after(shm::Nanoseconds now, bool all) {
   if (options_.on_round) options_.on_round();
 }
 
-shm::Nanoseconds Bridge::next_round(shm::Nanoseconds now) const {
-  shm::Nanoseconds next = std::min(tend_at_, now + kLookPeriod);
+shm::Nanoseconds Bridge::next_round() const {
+  shm::Nanoseconds next = tend_at_;
   for (const auto& part : parts_) {
     if (part->outgoing) next = std::min(next, part->outgoing->next());
   }

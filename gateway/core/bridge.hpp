@@ -107,7 +107,7 @@ class Bridge {
   // To whoever obeys an `out` entry. An entry whose port was not opened is somebody else's.
   void take_leave();
   void look_after(shm::Nanoseconds now, bool all);
-  [[nodiscard]] shm::Nanoseconds next_round(shm::Nanoseconds now) const;
+  [[nodiscard]] shm::Nanoseconds next_round() const;
   // False: `stop` is readable.
   bool hear(int milliseconds, bool& all);
   void serve(shm::Nanoseconds now, bool all);

@@ -34,7 +34,8 @@ class MaxAges final : public AgesOfSources {
   // Reads memory, and the daemon's news; does not wait. Call it where there is news, and twice a
   // second.
   void update();
-  // Whether another model may be in force than at the last update(): one load. Ten times a second.
+  // Whether another model may be in force than at the last update(): one load. Ask it before that
+  // takes up what the daemon says of it.
   [[nodiscard]] bool is_outdated() const;
   // Readable when the daemon has said something; negative: it has not let us in yet.
   [[nodiscard]] int descriptor() const noexcept {

@@ -1,4 +1,4 @@
-// Those who have asked to be told of every page and port name.
+// Those who have asked to be told of every page and port name, and which model is in force.
 //
 // What is to be told stands once, in PortNames, in the order of its last change; an observer is
 // a place in it. So an open costs the same however many observe, and one that does not read is not
@@ -7,6 +7,7 @@
 
 #include <cstdint>
 #include <map>
+#include <utility>
 #include <vector>
 
 #include "service/clients/clients.hpp"
@@ -28,8 +29,9 @@ class Observers {
   }
   void forget(ClientId client) { observers_.erase(client); }
 
-  // Tells some of them something. True: there is more that could be told at once.
-  bool tell(const Clients& clients, Switchboard& switchboard) {
+  // Tells some of them something. `generation`: of the model in force. True: there is more that
+  // could be told at once.
+  bool tell(const Clients& clients, Switchboard& switchboard, std::uint64_t generation) {
     int left = kMostAtOnce;
     bool is_more = false;
     for (std::size_t i = 0; i < observers_.size() && left > 0; ++i) {
@@ -40,6 +42,7 @@ class Observers {
       Observer& observer = next->second;
       if (!client.has_queue()) {
         is_more = switchboard.show_news(client, observer.told, left) || is_more;
+        tell_model(client, observer, generation);
       }
       while (!observer.waiting.empty() && observer.waiting.front().news <= observer.told) {
         client.send(reply_to(observer.waiting.front().request, wire::MessageKind::kDone));
@@ -59,8 +62,16 @@ class Observers {
   };
   struct Observer {
     std::uint64_t told = 0;
+    std::uint64_t generation = 0;  // that it was told
     std::vector<Request> waiting;
   };
+
+  static void tell_model(Client& client, Observer& observer, std::uint64_t generation) {
+    if (client.is_lost() || std::exchange(observer.generation, generation) == generation) return;
+    wire::Message message = message_to(wire::MessageKind::kModelInForce, 0, 0, 0);
+    message.link = generation;
+    client.send(message);
+  }
 
   std::map<ClientId, Observer> observers_;
   ClientId last_told_ = 0;

@@ -73,6 +73,20 @@ TEST(Instance, KnowsTheNamesOfPortsAndSources) {
   EXPECT_FALSE(instance->find_source("/p"));
 }
 
+// It need not look for it.
+TEST(Instance, IsToldOfAnotherModel) {
+  Daemon daemon(kModel);
+  const auto instance = watched(daemon);
+  pollfd told{instance->descriptor(), POLLIN, 0};
+  EXPECT_EQ(::poll(&told, 1, 0), 0) << "nothing has changed";
+  const auto before = instance->memory()->tables().generation();
+  daemon.load(kModel + "<!-- reloaded -->");
+  EXPECT_EQ(::poll(&told, 1, -1), 1);
+  EXPECT_GT(instance->memory()->tables().generation(), before);
+  instance->update();
+  EXPECT_EQ(::poll(&told, 1, 0), 0) << "once is enough";
+}
+
 TEST(Instance, IsNoComponentAndStartsNoThread) {
   Daemon daemon(kModel);
   const auto before = threads_of_this_process();
