@@ -96,7 +96,7 @@ class AcrossHosts {
  private:
   // Nearly all sources are asked for as it is written. Of these the diagrams are asked.
   void look_at(const PortRules& port, Dependence& dependence) {
-    Polarity before;  // with conflict="first", what keeps the next rule from winning
+    Polarity before;  // with conflict="first", what lets the next rule win: no earlier one holds
     std::set<std::string> required, negated;
     const auto is_asked = [&](const ConnectionRule& rule, const std::string& source, bool active) {
       return places_.are_apart(source, port.port) && dependence.needs(rule.source, source, active);
@@ -105,7 +105,9 @@ class AcrossHosts {
       Polarity polarity;
       polarity.visit(*rule.condition);
       polarity.add(rule.source, true);
-      for (const std::string& source : polarity.required()) {
+      std::set<std::string> awaited = polarity.required();
+      awaited.insert(before.required().begin(), before.required().end());
+      for (const std::string& source : awaited) {
         if (!required.contains(source) && is_asked(rule, source, true)) required.insert(source);
       }
       std::set<std::string> silent = polarity.negated();
