@@ -57,17 +57,25 @@ std::string inhibition_text(const rules::Cause& cause, const Sources& sources) {
   if (cause.speaker) text += " (its behaviour \"" + cause.speaker->name + "\")";
   if (cause.of && cause.of->is_meta) text += " through " + describe(*cause.of);
   text += place_text(cause.where) + ": ";
-  text += cause.own_activity == OwnActivity::kNoMatter
-              ? literals_text(cause.because, sources)
-              : std::string(will_be ? "once it is active, it is itself" : "it is itself") +
-                    " a source of that one";
-  if (!cause.also.empty()) {
-    text += "; so " + std::string(cause.also.size() == 1 ? "is " : "are ");
-    for (std::size_t i = 0; i < std::min(cause.also.size(), kMaxNamed); ++i) {
-      text += (i == 0 ? "" : ", ") + cause.also[i];
-    }
-    if (cause.also.size() > kMaxNamed) text += ", …";
+  std::vector<rules::Literal> because = cause.because;
+  std::vector<std::string> also = cause.also;
+  const bool is_own_too = because.empty() && !also.empty();
+  if (is_own_too) {
+    because.push_back({also.front(), true});
+    also.erase(also.begin());
   }
+  text += because.empty()
+              ? std::string(will_be ? "once it is active, it is itself" : "it is itself") +
+                    " a source of that one"
+              : literals_text(because, sources);
+  if (!also.empty()) {
+    text += "; so " + std::string(also.size() == 1 ? "is " : "are ");
+    for (std::size_t i = 0; i < std::min(also.size(), kMaxNamed); ++i) {
+      text += (i == 0 ? "" : ", ") + also[i];
+    }
+    if (also.size() > kMaxNamed) text += ", …";
+  }
+  if (is_own_too) text += "; it is itself a source of that one, too";
   if (cause.across_ports) text += "; it has no connection here, so each of its sources inhibits";
   return text;
 }

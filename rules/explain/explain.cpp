@@ -238,14 +238,15 @@ class PortInquiry {
     part.causes.push_back(std::move(cause));
   }
 
-  // Which sources inhibit. The connection's own is enough, where it is one of them.
+  // Which sources inhibit. The connection's own is enough, where it is one of them; whether it
+  // alone makes it so, the others tell.
   void add_voices(const Voices& voices, std::size_t inhibitor, bool is_own_a_voice, Cause& cause) {
     for (const Voice& voice : voices.active) {
       if (*voice.source == *own_) continue;
       cause.also.push_back(*voice.source);
     }
     if (is_own_a_voice) {
-      note_own_activity(cause);
+      if (cause.also.empty()) note_own_activity(cause);
     } else {
       const auto winner =
           std::find_if(voices.active.begin(), voices.active.end(), [this](const Voice& voice) {

@@ -46,9 +46,10 @@ struct Cause {
 
   std::string condition;  // as it is written, quantifiers and all
 
-  // Enough to make it so. Empty: no activity of other sources can make it otherwise.
+  // Enough to make it so. Empty: no activity of other sources can make it otherwise; of an
+  // inhibition: the connection's own source is one of those that inhibit.
   std::vector<Literal> because;
-  // Further sources that inhibit as well, each by itself.
+  // Further sources that are active and inhibit as well, each by itself.
   std::vector<std::string> also;
 };
 

@@ -152,6 +152,23 @@ TEST_F(Explained, AnInhibitionByItsOwnSourceIsToldBeforeItIsActive) {
   EXPECT_THAT(only_cause(shared).because, IsEmpty());
 }
 
+TEST_F(Explained, AnInhibitionByItsOwnSourceAndOthersIsNotByItsOwnActivity) {
+  const std::string model = R"(<behaviors>
+<behavior name="A"><config at="/p">/s</config></behavior>
+<behavior name="B"><config at="/q">/s</config><config at="/q">/x</config>
+  <inhibition>A</inhibition></behavior>
+</behaviors>)";
+  for (const bool is_active : {false, true}) {
+    const std::set<std::string> active =
+        is_active ? std::set<std::string>{"/s", "/x"} : std::set<std::string>{"/x"};
+    const auto shared = connection(model, "/s", active);
+    const Cause& cause = only_cause(shared);
+    EXPECT_EQ(cause.own_activity, Cause::OwnActivity::kNoMatter) << "/x inhibits, too";
+    EXPECT_THAT(cause.because, IsEmpty()) << "once /x is inactive, it inhibits itself";
+    EXPECT_THAT(cause.also, ElementsAre("/x"));
+  }
+}
+
 TEST_F(Explained, WhatIsInactiveIsToldOfTheEarlierOneThatWouldWinAllTheSame) {
   const std::string model = R"(<behaviors><arbiter at="/p" conflict="first">
 <select from="/high">/go</select><select from="/yields">not /low</select>

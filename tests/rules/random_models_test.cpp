@@ -209,12 +209,11 @@ class Explanations {
       const auto by_own = cause.own_activity != rules::Cause::OwnActivity::kNoMatter;
       auto without_own = active;
       without_own.erase(own);
-      if (!inhibits) {
-        EXPECT_EQ(by_own, naive_.obstacles(behaviour, port, without_own).count(obstacle) == 0);
-      }
+      EXPECT_EQ(by_own, naive_.obstacles(behaviour, port, without_own).count(obstacle) == 0);
       if (!inhibits || by_own) continue;
-      // Once all that it names are inactive, the inhibition is over.
-      auto after = active;
+      // Once all that it names are inactive, and the source itself where that is one of them, the
+      // inhibition is over.
+      auto after = cause.because.empty() ? without_own : active;
       for (const auto& literal : cause.because) after.erase(literal.source);
       for (const auto& source : cause.also) after.erase(source);
       EXPECT_EQ(naive_.obstacles(behaviour, port, after).count(obstacle), 0u) << obstacle;
