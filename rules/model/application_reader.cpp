@@ -71,16 +71,25 @@ class ApplicationReader {
     const auto meant = misspelt_for(element.text, ours);
     if (!meant || element.text == kYarpsArbitrator) return;
     const std::string tag = '<' + std::string(element.text) + '>';
-    diagnostics_.warning("misspelt-element", locate(file_, element),
-                         tag +
-                             " is nothing that Arbiter knows in an application, and is passed "
-                             "over with all that it holds; did you mean <" +
-                             *meant + ">?");
+    bool is_wrapper = false;
+    for (const XmlNode& part : Elements(element.first_child)) {
+      is_wrapper = is_wrapper || part.text == *meant;
+    }
+    diagnostics_.warning(
+        "misspelt-element", locate(file_, element),
+        tag +
+            " is nothing that Arbiter knows in an application, and is passed "
+            "over with all that it holds; " +
+            (is_wrapper ? "each <" + *meant + "> stands in <application> itself: remove " + tag +
+                              " and its end, and leave what it holds"
+                        : "did you mean <" + *meant + ">?"));
   }
 
   static std::optional<std::string> misspelt_for(std::string_view tag,
                                                  const std::vector<std::string_view>& ours) {
     if (std::find(ours.begin(), ours.end(), tag) != ours.end()) return {};
+    const auto same = std::find(ours.begin(), ours.end(), lower_case(tag));
+    if (same != ours.end()) return std::string(*same);
     auto meant = find_similar(tag, ours);
     // Of short words, with one letter for another, there are too many: <note>, <mode>.
     constexpr std::size_t kShort = 4;
@@ -162,8 +171,8 @@ class ApplicationReader {
   }
 
   bool read_connection(const XmlNode& element) {
-    const auto source = read_end(element, "from");
-    const auto port = read_end(element, "to");
+    const auto source = read_end(element, "from", "output");
+    const auto port = read_end(element, "to", "input");
     if (!source || !port) return false;
     const Location where = locate(file_, element);
     const auto [known, is_new] = known_.try_emplace({*source, *port}, where);
@@ -177,9 +186,13 @@ class ApplicationReader {
     return true;
   }
 
-  std::optional<std::string> read_end(const XmlNode& connection, std::string_view tag) {
-    for (const XmlNode& element : Elements(connection.first_child)) {
-      if (element.text == tag) return read_name(element);
+  // YARP reads the second tag where the first is missing.
+  std::optional<std::string> read_end(const XmlNode& connection, std::string_view tag,
+                                      std::string_view second_tag) {
+    for (const std::string_view each : {tag, second_tag}) {
+      for (const XmlNode& element : Elements(connection.first_child)) {
+        if (element.text == each) return read_name(element);
+      }
     }
     std::string advice = "write the name of a port in it";
     for (const XmlNode& element : Elements(connection.first_child)) {

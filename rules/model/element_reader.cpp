@@ -43,17 +43,38 @@ bool contains(KnownNames names, std::string_view name) {
   return std::find(names.begin(), names.end(), name) != names.end();
 }
 
+// Of the elements of a gateway's mapping, which are read here, too.
+bool is_of_mapping(std::string_view element) {
+  return contains({"in", "out", "gateway", "gateways"}, element);
+}
+
 // What belongs elsewhere, or is called otherwise. Other multiplexers give a timeout and a priority
 // to whoever commands. Empty: nothing is known of it.
 std::string_view advice_on(std::string_view attribute, std::string_view element, KnownNames known) {
   if (attribute == "timeout" || attribute == "time") {
     if (contains(known, "timeout")) return "did you mean timeout?";
+    if (element == "in") {
+      return "the model says how long a source stays active: write <source port=\"…\" "
+             "timeout=\"…\"/> there";
+    }
+    if (is_of_mapping(element)) return {};
     return "a source has one: write <source port=\"…\" timeout=\"…\"/> beside the behaviours of "
            "the model";
   }
   if (attribute == "priority") {
+    if (element == "select" || element == "arbiter") {
+      return "write <arbiter at=\"…\" conflict=\"first\">, so that the first <select> in it "
+             "wins, or let the conditions exclude each other";
+    }
+    if (is_of_mapping(element)) {
+      return "the model decides who wins: name there those that a behaviour keeps out in its "
+             "<inhibition>";
+    }
     return "in the model name those that a behaviour keeps out in its <inhibition>, or write "
            "<arbiter at=\"…\" conflict=\"first\"/>, so that the first in the file wins";
+  }
+  if (element == "define" && attribute == "value") {
+    return "write the value between the tags: <define name=\"…\">…</define>";
   }
   if (element == "config" && attribute == "from") {
     return "write the output port between the tags: <config at=\"…\">…</config>";
@@ -61,6 +82,18 @@ std::string_view advice_on(std::string_view attribute, std::string_view element,
   if (element == "config" && (attribute == "to" || attribute == "port")) return "did you mean at?";
   if (element == "select" && (attribute == "to" || attribute == "at")) {
     return "the <arbiter at=\"…\"> around it says where";
+  }
+  return {};
+}
+
+// Of an element that is no other's. Empty: nothing is known of it.
+std::string_view advice_on_element(std::string_view name, KnownNames known) {
+  if (name == "timeout" || name == "priority") return advice_on(name, "", known);
+  if (!contains(known, "inhibition")) return {};
+  if (name == "inhibits") return "did you mean <inhibition>?";
+  if (name.starts_with("inhibited")) {
+    return "an <inhibition> stands in the behaviour that inhibits, and names those that it keeps "
+           "out";
   }
   return {};
 }
@@ -172,7 +205,9 @@ void ElementReader::report_unknown_element(const XmlNode& element, KnownNames kn
       return in_brackets(element) +
              " is not known here; write a connection as <config at=\"…\">…</config>";
     }
-    return in_brackets(element) + " is not known here" + propose(element.text, known, "<", ">");
+    const std::string_view better = advice_on_element(element.text, known);
+    return in_brackets(element) + " is not known here" +
+           (better.empty() ? propose(element.text, known, "<", ">") : "; " + std::string(better));
   });
 }
 

@@ -8,20 +8,58 @@ namespace arbiter::rules {
 
 std::string ConflictAdvice::inhibition(const std::vector<std::size_t>& one,
                                        const std::vector<std::size_t>& other) {
-  const char* const plain = "let one inhibit the other";
   if (one.empty() || other.empty()) return {};
-  if (one.size() > 1 || other.size() > 1) return plain;
+  if (one.size() > 1 || other.size() > 1) {
+    const std::string advice = inhibition_of_all(one, other);
+    return advice.empty() ? inhibition_of_all(other, one) : advice;
+  }
   if (one == other) {
     return "give each a behaviour of its own in place of " +
            quote(rules_.behaviours[one.front()].name) + " and let one inhibit the other";
   }
-  const auto way = way_to(rules_.behaviours[one.front()].name);
-  const auto other_way = way_to(rules_.behaviours[other.front()].name);
+  const char* const plain = "let one inhibit the other";
+  const auto siblings = siblings_above(one.front(), other.front());
+  if (!siblings) return plain;
+  const auto& [mine, theirs] = *siblings;
+  const bool are_they = mine == rules_.behaviours[one.front()].name &&
+                        theirs == rules_.behaviours[other.front()].name;
+  if (are_they) return plain;
+  return "let " + quote(mine) + " inhibit " + quote(theirs) + " or the other way round";
+}
+
+// One inhibitor that has the one's source is enough, if none of the behaviours that configure the
+// other is left out.
+std::string ConflictAdvice::inhibition_of_all(const std::vector<std::size_t>& inhibitors,
+                                              const std::vector<std::size_t>& inhibited) {
+  for (const std::size_t inhibitor : inhibitors) {
+    std::string_view name;
+    std::vector<std::string> names;
+    for (const std::size_t each : inhibited) {
+      const auto siblings = siblings_above(inhibitor, each);
+      if (!siblings || (!name.empty() && siblings->first != name)) {
+        names.clear();
+        break;
+      }
+      name = siblings->first;
+      std::string theirs = quote(siblings->second);
+      if (std::find(names.begin(), names.end(), theirs) == names.end()) {
+        names.push_back(std::move(theirs));
+      }
+    }
+    constexpr std::size_t kMost = 4;  // more than these is no advice
+    if (names.empty() || names.size() > kMost) continue;
+    return "let " + quote(name) + " inhibit " + enumerate(names);
+  }
+  return {};
+}
+
+std::optional<ConflictAdvice::Siblings> ConflictAdvice::siblings_above(std::size_t one,
+                                                                       std::size_t other) {
+  const auto way = way_to(rules_.behaviours[one].name);
+  const auto other_way = way_to(rules_.behaviours[other].name);
   const auto parting = std::mismatch(way.begin(), way.end(), other_way.begin(), other_way.end());
-  if (parting.first == way.end() || parting.second == other_way.end()) return plain;
-  if (parting.first + 1 == way.end() && parting.second + 1 == other_way.end()) return plain;
-  return "let " + quote(*parting.first) + " inhibit " + quote(*parting.second) +
-         " or the other way round";
+  if (parting.first == way.end() || parting.second == other_way.end()) return {};
+  return Siblings{*parting.first, *parting.second};
 }
 
 std::vector<std::string_view> ConflictAdvice::way_to(std::string_view behaviour) {

@@ -3,9 +3,11 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <unordered_map>
+#include <utility>
 #include <vector>
 
 #include "rules/model/rule_set.hpp"
@@ -23,6 +25,13 @@ class ConflictAdvice {
                                        const std::vector<std::size_t>& other);
 
  private:
+  using Siblings = std::pair<std::string_view, std::string_view>;
+
+  [[nodiscard]] std::string inhibition_of_all(const std::vector<std::size_t>& inhibitors,
+                                              const std::vector<std::size_t>& inhibited);
+  // Those of one parent that are, or contain, the one and the other; nothing: one contains the
+  // other, or they are the same.
+  [[nodiscard]] std::optional<Siblings> siblings_above(std::size_t one, std::size_t other);
   // It, and the meta-behaviours above it, the outermost first.
   [[nodiscard]] std::vector<std::string_view> way_to(std::string_view behaviour);
 

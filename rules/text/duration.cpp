@@ -118,13 +118,18 @@ ParsedDuration parse_duration(std::string_view text, const DurationWords& words)
   if (known == nullptr) {
     if (unit.find_first_not_of("0123456789.,") == std::string_view::npos)
       return refuse("has no unit", words.advice);
-    const bool has_blank = unit.front() == ' ';
-    const std::string why = has_blank ? "has a blank" : "has an unknown unit";
-    if (const auto ours = in_our_units(text.substr(0, digits), unit); !ours.empty())
+    const std::string_view number = text.substr(0, digits);
+    const std::string why = unit.front() == ' ' ? "has a blank" : "has an unknown unit";
+    if (const auto ours = in_our_units(number, unit); !ours.empty())
       return refuse(why, "write " + ours + " in its place");
-    if (has_blank) return refuse(why, "write the unit right behind the number, as in 500ms");
+    if (const auto minutes = in_our_units(number, "min"); trim(unit) == "m" && !minutes.empty()) {
+      return refuse("has an unknown unit", "write " + minutes + " for minutes, or " +
+                                               std::string(number) + "ms for milliseconds");
+    }
     const bool is_fraction = unit.starts_with('.') || unit.starts_with(',');
-    if (!is_fraction) return refuse(why, words.advice);
+    if (find_unit(trim(unit), words.takes_minutes) != nullptr)
+      return refuse(why, "write the unit right behind the number, as in 500ms");
+    if (!is_fraction) return refuse("has an unknown unit", words.advice);
     const std::string whole = without_fraction(text, words.takes_minutes);
     return refuse("is a fraction",
                   whole.empty() ? "take a smaller unit" : "write " + whole + " in its place");

@@ -51,6 +51,8 @@ TEST(Application, WarnsOfAMisspeltElement) {
                           "4:1 warning misspelt-element", "5:9 warning misspelt-element",
                           "5:23 warning misspelt-element", "5:40 warning misspelt-element"));
   EXPECT_THAT(loaded.message(), HasSubstr("did you mean <connection>?"));
+  EXPECT_THAT(loaded.message(1), HasSubstr("each <module> stands in <application> itself: remove "
+                                           "<modules> and its end, and leave what it holds"));
 }
 
 // YARP's own, what a module has beside its own, and short words that differ in a letter.
@@ -68,6 +70,20 @@ TEST(Application, SaysWhichEndOfAConnectionIsMisspelt) {
       kModel, "<application>" + connection("/s", "/p") +
                   "<connection><form>/a</form><to>/b</to></connection></application>");
   EXPECT_THAT(loaded.message(), HasSubstr("lacks <from>; did you mean it where it has <form>?"));
+  const Loaded capital = load_with_application(
+      kModel, "<application>" + connection("/s", "/p") +
+                  "<connection><From>/a</From><TO>/b</TO></connection></application>");
+  EXPECT_THAT(capital.message(0), HasSubstr("lacks <from>; did you mean it where it has <From>?"));
+  EXPECT_THAT(capital.message(1), HasSubstr("lacks <to>; did you mean it where it has <TO>?"));
+}
+
+TEST(Application, MayCallTheEndsOfAConnectionOutputAndInputAsYarpDoes) {
+  const Loaded loaded = load_with_application(
+      kModel,
+      "<application><connection><output>/s</output><input>/p</input></connection>"
+      "<connection><output>/no</output><from>/a</from><to>/b</to></connection></application>");
+  EXPECT_THAT(loaded.findings(), IsEmpty()) << loaded.message();
+  EXPECT_THAT(show_others(loaded), ElementsAre("/a -> /b"));
 }
 
 TEST(Application, PassesOverEverythingElse) {

@@ -121,7 +121,8 @@ TEST(Defines, MistakesAreReportedAtTheirPlace) {
       {"<define>b</define>", "1:1 error missing-attribute", "lacks the attribute name"},
       {"<define name='a}b'>b</define>", "1:15 error invalid-name", "$ { }"},
       {"<define name='a'><b/></define>", "1:18 error unknown-element", "<define> takes text only"},
-      {"<define name='a' value='b'/>", "1:18 error unknown-attribute", "\"value\"; it takes name"},
+      {"<define name='a' value='b'/>", "1:18 error unknown-attribute",
+       "\"value\"; write the value between the tags: <define name="},
   };
   for (const Case& c : cases) {
     const Loaded loaded = load_text(c.model);

@@ -63,7 +63,11 @@ TEST(Duration, OfAnotherUnitTheSameInOneOfOursIsTold) {
       {"10µs", "has an unknown unit; write 10us in its place"},
       {"500 ms", "has a blank; write 500ms in its place"},
       {"5 min", "has a blank; write 300s in its place"},
-      {"5 parsecs", "has a blank; write the unit right behind"},
+      {"0 ms", "has a blank; write the unit right behind the number"},
+      {"5 parsecs", "has an unknown unit; write a whole number"},
+      {"5 m", "has an unknown unit; write 300s for minutes, or 5ms for milliseconds"},
+      {"5m", "has an unknown unit; write 300s for minutes, or 5ms for milliseconds"},
+      {"0m", "has an unknown unit; write a whole number"},
       {"2305843009213693952h", "has an unknown unit; write a whole number"},
       {"0h", "has an unknown unit; write a whole number"},
   };

@@ -206,6 +206,16 @@ TEST(Proof, SaysWhichInhibitionWouldHelp) {
             "give each a behaviour of its own in place of \"A\" and let one inhibit the other, "
             "give one");
   EXPECT_EQ(advice_in(a + "<arbiter at='/p'><select from='/b'/></arbiter>"), "give one");
+  // Several behaviours for one connection.
+  const std::string more_of_b = "<behavior name='C'><config at='/p'>/b</config></behavior>";
+  EXPECT_EQ(advice_in(a + b + more_of_b), "let \"A\" inhibit \"B\" and \"C\", give one");
+  EXPECT_EQ(advice_in(a + b + more_of_b +
+                      "<meta_behavior name='M'><behavior>B</behavior><behavior>C</behavior>"
+                      "</meta_behavior>"),
+            "let \"A\" inhibit \"M\", give one");
+  const std::string both = "<config at='/p'>/a</config><config at='/p'>/b</config></behavior>";
+  EXPECT_EQ(advice_in(b + "<behavior name='Both'>" + both), "let \"B\" inhibit \"Both\", give one");
+  EXPECT_EQ(advice_in("<behavior name='One'>" + both + "<behavior name='Two'>" + both), "give one");
 }
 
 TEST(Proof, WhatIsToBeCopiedIsXml) {
