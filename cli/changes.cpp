@@ -5,6 +5,7 @@
 #include <iostream>
 #include <optional>
 #include <set>
+#include <stdexcept>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -21,14 +22,18 @@
 namespace arbiter::cli {
 namespace {
 
+void write_past(const std::string& what, const wire::PastModelStatus& past) {
+  std::cout << what << past.name;
+  for (const auto& file : past.files) std::cout << ' ' << file;
+  std::cout << " (" << past.how << ")\n";
+}
+
 void write_in_force(const wire::ChangeReport& report) {
   const std::uint64_t generation = report.generation.value_or(0);
   std::cout << (generation == 0 ? "no model" : "model " + std::to_string(generation))
             << " is in force" << (report.already.value_or(false) ? " already" : "") << '\n';
   if (const auto& past = report.back_to) {
-    std::cout << "  it is model " << past->generation << " again: " << past->name;
-    for (const auto& file : past->files) std::cout << ' ' << file;
-    std::cout << " (" << past->how << ")\n";
+    write_past("  it is model " + std::to_string(past->generation) + " again: ", *past);
   }
   if (report.changes) std::cout << "  " << report.changes->summary << '\n';
   if (report.policy && report.policy->differs) {
@@ -136,6 +141,30 @@ void name_files_from_here(wire::ChangeReport& report, const nlohmann::json& docu
   }
 }
 
+// Of the input ports that a dry run drops from the model in force, those that somebody has open.
+void write_dropped(const std::string& verb, const std::string& instance,
+                   const wire::ChangeReport& report) {
+  for (const auto& model : report.models.value_or(std::vector<wire::ModelComparison>())) {
+    if (!model.in_force) continue;
+    write_open("open now, and no longer mentioned by model " +
+                   rules::quote(shm::printable(model.name)) + ", so that no sample would arrive",
+               unmentioned(verb, instance, report, true));
+  }
+}
+
+// One model of several, in a dry run. A difference begins with a line of its own.
+void write_changes(const wire::ModelComparison& model, bool is_alone) {
+  const std::string text = model.changes
+                               ? model.changes->text
+                               : "not compared: the model in force comes from an earlier daemon\n";
+  const bool is_one_line = text.find('\n') + 1 == text.size();
+  if (!is_alone) {
+    std::cout << model.name << (model.in_force ? " (in force):" : ":")
+              << (is_one_line ? ' ' : '\n');
+  }
+  std::cout << text;
+}
+
 }  // namespace
 
 wire::ChangeReport ask_for_change(const std::string& verb, const std::string& instance,
@@ -162,16 +191,6 @@ wire::ChangeReport ask_for_change(const std::string& verb, const std::string& in
   return report;
 }
 
-void write_dropped(const std::string& verb, const std::string& instance,
-                   const wire::ChangeReport& report) {
-  for (const auto& model : report.models.value_or(std::vector<wire::ModelComparison>())) {
-    if (!model.in_force) continue;
-    write_open("open now, and no longer mentioned by the files of model " +
-                   rules::quote(shm::printable(model.name)) + ", so that no sample would arrive",
-               unmentioned(verb, instance, report, true));
-  }
-}
-
 int change_model(const std::string& verb, const std::string& instance,
                  const wire::Message& question, bool json) {
   const auto report = ask_for_change(verb, instance, question, json);
@@ -181,6 +200,32 @@ int change_model(const std::string& verb, const std::string& instance,
     write_open("open, but not mentioned by this model, so that no sample arrives",
                unmentioned(verb, instance, report, false));
   }
+  return 0;
+}
+
+int preview_change(const std::string& verb, const std::string& instance,
+                   const wire::Message& question, bool json) {
+  const auto report = ask_for_change(verb, instance, question, json);
+  const bool goes_back = (question.flags & wire::kGoesBack) != 0;
+  if (report.ok && goes_back && !report.back_to) {
+    throw std::runtime_error(
+        "the daemon is older than this program, and cannot say what a rollback would do; nothing "
+        "has changed");
+  }
+  if (json || !report.ok) return report.ok ? 0 : 1;
+  if (goes_back) {
+    write_past("back to model " + std::to_string(report.back_to->generation) + ": ",
+               *report.back_to);
+  }
+  const auto models = report.models.value_or(std::vector<wire::ModelComparison>());
+  for (const auto& model : models) write_changes(model, models.size() == 1);
+  write_dropped(verb, instance, report);
+  if (report.policy && report.policy->differs) {
+    std::cout << "the policy " << report.policy->file << " differs from the one in force: it has "
+              << rules::counted(report.policy->rules, "rule") << '\n';
+  }
+  std::cout << "this was a dry run: arbiter " << verb << " puts "
+            << (goes_back ? "that model" : "the files") << " in force\n";
   return 0;
 }
 

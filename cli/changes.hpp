@@ -15,14 +15,14 @@ namespace arbiter::cli {
 wire::ChangeReport ask_for_change(const std::string& verb, const std::string& instance,
                                   wire::Message question, bool json);
 
-// Of the input ports that the files of a dry run drop from the model in force, those that somebody
-// has open.
-void write_dropped(const std::string& verb, const std::string& instance,
-                   const wire::ChangeReport& report);
-
 // Asks for it, and says, unless `json`: "model 5 is in force", what that changes, and which open
 // ports it does not mention. Gives the verb's exit code. Throws as ask_for_change().
 int change_model(const std::string& verb, const std::string& instance,
                  const wire::Message& question, bool json);
+
+// Asks for a dry run, of a reload or a rollback, and says, unless `json`, what it would change. The
+// rest is as in change_model().
+int preview_change(const std::string& verb, const std::string& instance,
+                   const wire::Message& question, bool json);
 
 }  // namespace arbiter::cli

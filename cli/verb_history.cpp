@@ -53,13 +53,19 @@ int history(const HistoryOptions& options) {
 struct RollbackOptions {
   std::string instance;
   std::uint64_t generation = 0;
+  bool dry_run = false;
   bool json = false;
 };
 
 int rollback(const RollbackOptions& options) {
   wire::Message question;
-  question.kind = wire::MessageKind::kRollback;
   question.link = options.generation;
+  if (options.dry_run) {
+    question.kind = wire::MessageKind::kReload;
+    question.flags = wire::kDryRun | wire::kGoesBack;
+    return preview_change("rollback", options.instance, question, options.json);
+  }
+  question.kind = wire::MessageKind::kRollback;
   return change_model("rollback", options.instance, question, options.json);
 }
 
@@ -83,11 +89,13 @@ void add_rollback(CLI::App& app, int& exit_code) {
   verb->add_option("GENERATION", options->generation, "Its number in arbiter history")
       ->type_name("N")
       ->check(at_least_one());
+  verb->add_flag("--dry-run", options->dry_run, "Only show which decisions would change");
   verb->add_flag("--json", options->json, "Write the daemon's report as JSON");
   add_instance_option(*verb, options->instance);
   verb->footer(R"(Example:
   arbiter rollback        # to the previous model; a second time: to the one before that
   arbiter rollback 3
+  arbiter rollback 3 --dry-run
 
 No file is read or changed: the next reload, and the next daemon, read them again.)");
   verb->callback([options, &exit_code] { exit_code = rollback(*options); });

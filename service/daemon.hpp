@@ -122,6 +122,7 @@ class Daemon final : private Takeover::Host {
   bool hand_back(Client& client, wire::Received& received);
   // False: it is about no change of the model.
   bool change_model(Client& client, const wire::Message& message);
+  void ask_for_reload(Client& client, const wire::Message& message);
   void ask_for_switch(Client& client, const wire::Message& message);
   void hello(Client& client, const wire::Received& received);
   void welcome(Client& client) override;

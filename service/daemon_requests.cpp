@@ -167,13 +167,7 @@ bool Daemon::change_model(Client& client, const wire::Message& message) {
   switch (message.kind) {
     case wire::MessageKind::kReload:
       gate_.require(client, Action::kReload);
-      changes_.ask(
-          {(message.flags & wire::kDryRun) != 0 ? Change::Kind::kCompare : Change::Kind::kReload,
-           {},
-           0,
-           {},
-           {}},
-          client, message);
+      ask_for_reload(client, message);
       return true;
     case wire::MessageKind::kSwitch:
       gate_.require(client, Action::kSwitch);
@@ -186,6 +180,16 @@ bool Daemon::change_model(Client& client, const wire::Message& message) {
     default:
       return false;
   }
+}
+
+void Daemon::ask_for_reload(Client& client, const wire::Message& message) {
+  Change change{Change::Kind::kReload, {}, 0, {}, {}};
+  if ((message.flags & wire::kDryRun) != 0) {
+    change.kind = Change::Kind::kCompare;
+    change.of_past = (message.flags & wire::kGoesBack) != 0;
+    if (change.of_past) change.generation = message.link;
+  }
+  changes_.ask(std::move(change), client, message);
 }
 
 void Daemon::ask_for_switch(Client& client, const wire::Message& message) {

@@ -52,7 +52,7 @@ enum class MessageKind : std::uint32_t {
   kObserve,      // send every page and every port name, now and as they come
   kPeerRefused,  // port, peer, text: the client could not take up a peer, for status
   kReload,       // read the files again; kDone (value: the generation) once they are in force.
-                 // flags: kWantsReport, kDryRun (with it)
+                 // flags: kWantsReport, kDryRun (with it), kGoesBack (link: as kRollback)
   kStop,         // kDone, and then the daemon ends
   kSwitch,       // name: a model that is loaded; kDone (value: the generation) in force
   kRollback,     // link: a generation of the history, 0: the one before; as kReload
@@ -127,6 +127,7 @@ enum MessageFlag : std::uint32_t {
   kTellsActivity = 512,  // else the daemon does not know it
   kYields = 1024,        // the output port gives way to one of its name that does not
   kHasNoPorts = 2048,    // who rejoins is a newcomer to a daemon that has other memory
+  kGoesBack = 4096,      // of a dry run: say what a rollback would do, and not a reload
 };
 
 struct Message {

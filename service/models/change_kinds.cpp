@@ -235,8 +235,22 @@ void ModelChanges::prepare_rollback(Swap& swap) {
   });
 }
 
+// What `arbiter rollback --dry-run` shows.
+void ModelChanges::prepare_look_back(Swap& swap) {
+  const PastModel& past = past_model(swap.change.generation);
+  swap.back_to = past;
+  prepare(swap, [before = in_force_.model, after = past.model](const std::stop_token& stop) {
+    Reading reading;
+    reading.models.push_back(after);
+    reading.diffs.push_back(
+        before == nullptr ? "null" : changes_between(*before, *after, kStepsOfDryRun, stop));
+    return reading;
+  });
+}
+
 // What `arbiter reload --dry-run` shows.
 void ModelChanges::prepare_comparison(Swap& swap) {
+  if (swap.change.of_past) return prepare_look_back(swap);
   std::vector<ModelPointer> loaded;
   for (const LoadedModel& each : library_.models()) loaded.push_back(each.model);
   prepare(swap, reading_job([loaded = std::move(loaded), in_force = in_force_.model,
@@ -259,11 +273,12 @@ void ModelChanges::finish_comparison(const Swap& swap, const Reading& reading) {
   for (std::size_t i = 0; i < reading.models.size(); ++i) {
     const std::string& name = reading.models[i]->name;
     models.push_back({{"name", name},
-                      {"in_force", name == board_.name()},
+                      {"in_force", swap.change.of_past || name == board_.name()},
                       {"changes", nlohmann::json::parse(reading.diffs[i])}});
   }
   answer(swap, {{"ok", true},
                 {"models", std::move(models)},
+                {"back_to", swap.back_to ? to_json(*swap.back_to) : nullptr},
                 {"policy", policy_json(reading.policy, changes_policy(reading.policy))}});
 }
 

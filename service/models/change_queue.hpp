@@ -17,7 +17,7 @@ namespace arbiter::service {
 struct Change {
   enum class Kind : std::uint8_t {
     kReload,
-    kCompare,  // the files with what is in force; changes nothing
+    kCompare,  // the files, or a model of the past, with what is in force; changes nothing
     kSwitch,
     kRollback,
   };
@@ -29,9 +29,10 @@ struct Change {
 
   Kind kind = Kind::kReload;
   std::string name;              // kSwitch: the model
-  std::uint64_t generation = 0;  // kRollback: which one; 0: the one before
+  std::uint64_t generation = 0;  // of a rollback: which one; 0: the one before
   std::string by;                // who asked first, for people
   std::vector<Asking> asking;    // are answered when it is over
+  bool of_past = false;          // kCompare: what a rollback would do, and not a reload
 };
 
 class ChangeQueue {
@@ -65,7 +66,8 @@ class ChangeQueue {
  private:
   // Each rollback counts for itself: two of them go back two steps.
   static bool are_one(const Change& last, const Change& next) {
-    return last.kind == next.kind && last.name == next.name && next.kind != Change::Kind::kRollback;
+    return last.kind == next.kind && last.name == next.name && last.of_past == next.of_past &&
+           last.generation == next.generation && next.kind != Change::Kind::kRollback;
   }
 
   void require_room_for(ClientId client) const {

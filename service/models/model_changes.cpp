@@ -130,7 +130,8 @@ void ModelChanges::attempt(Swap& swap, const std::function<void()>& step) {
     const std::string why =
         swap.findings.has_errors() ? swap.findings.why_refused() : std::string(error.what());
     if (swap.change.kind == Change::Kind::kCompare) {
-      log::info("{} asks what a reload would do: {}", swap.change.by, why);
+      log::info("{} asks what a {} would do: {}", swap.change.by,
+                swap.change.of_past ? "rollback" : "reload", why);
     } else {
       log_event({EventKind::kChangeRefused, {}, {}, {}, board_.in_force().generation},
                 log::level::err, "the model in force stays: {}", why);

@@ -116,6 +116,7 @@ class ModelChanges {
   void prepare_switch(Swap& swap);
   [[nodiscard]] const LoadedModel& loaded_model(const std::string& name) const;
   void prepare_rollback(Swap& swap);
+  void prepare_look_back(Swap& swap);
   [[nodiscard]] const PastModel& past_model(std::uint64_t asked) const;
   [[nodiscard]] std::string why_none_before() const;
   void prepare_comparison(Swap& swap);

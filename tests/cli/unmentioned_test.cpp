@@ -73,7 +73,7 @@ TEST(Unmentioned, AChangeNamesInputPortsThatGetNothingFromNowOn) {
       "<behaviors><behavior name='A'><config at='/Arm/pos:i'>/a:o</config>"
       "</behavior></behaviors>");
   EXPECT_THAT(arbiter({"reload", "--dry-run"}).out,
-              HasSubstr("\n  open now, and no longer mentioned by the files of model \"default\", "
+              HasSubstr("\n  open now, and no longer mentioned by model \"default\", "
                         "so that no sample would arrive: /Gaze/pos:i\nthis was a dry run"));
   const auto unmentioned = [](const ProgramResult& result) {
     return nlohmann::json::parse(result.out).at("unmentioned");
