@@ -7,7 +7,9 @@
 #include <filesystem>
 #include <iostream>
 #include <set>
+#include <stdexcept>
 #include <string_view>
+#include <vector>
 
 #include <CLI/CLI.hpp>
 
@@ -16,10 +18,13 @@
 #include "cli/model_files.hpp"
 #include "cli/output_file.hpp"
 #include "cli/port_name.hpp"
+#include "cli/port_patterns.hpp"
 #include "cli/progress.hpp"
+#include "command_line/shell_word.hpp"
 #include "drawing/graphviz.hpp"
 #include "drawing/only_ports.hpp"
 #include "rules/ask/report.hpp"
+#include "rules/model/quantifiers.hpp"
 #include "rules/text/names.hpp"
 
 namespace arbiter::cli {
@@ -78,6 +83,34 @@ std::string name_of(const std::string& path) {
   return says_nothing ? folder : stem;
 }
 
+// Throws std::runtime_error where a name or a pattern fits no input port of the model.
+std::set<std::string> chosen_ports(const rules::RuleSet& rules,
+                                   const std::vector<std::string>& patterns) {
+  std::set<std::string> all, chosen;
+  for (const rules::PortRules& each : rules.ports) all.insert(each.port);
+  for (const rules::Connection& each : rules.other_connections) all.insert(each.port);
+  for (const std::string& pattern : patterns) {
+    if (pattern.find('*') == std::string::npos) {
+      require_port(rules, pattern, "--port ");
+      chosen.insert(pattern);
+      continue;
+    }
+    bool fits_one = false;
+    for (const std::string& port : all) {
+      if (!rules::matches(pattern, port)) continue;
+      fits_one = true;
+      chosen.insert(port);
+    }
+    if (fits_one) continue;
+    const std::string similar = similar_pattern(pattern, {all.begin(), all.end()});
+    throw std::runtime_error("no input port of the model matches --port " +
+                             command_line::shell_word(pattern) +
+                             (similar.empty() ? "; `arbiter rules` shows the input ports"
+                                              : "; did you mean " + rules::quote(similar) + '?'));
+  }
+  return chosen;
+}
+
 }  // namespace
 
 Picture::Picture(const GraphOptions& options) : options_(options), format_(format_of(options)) {
@@ -94,9 +127,7 @@ bool Picture::load(const rules::ModelTexts& texts, const std::string& in_force) 
   is_good_ = !diagnostics.has_errors();
   if (!is_good_) return false;
   if (!options_.ports.empty()) {
-    const std::set<std::string> ports(options_.ports.begin(), options_.ports.end());
-    for (const std::string& port : ports) require_port(model_.rules, port, "--port ");
-    part_ = drawing::only_ports(model_, ports);
+    part_ = drawing::only_ports(model_, chosen_ports(model_.rules, options_.ports));
   }
   choose_view();
   set_title(texts, in_force);

@@ -1,5 +1,6 @@
 #include "cli/model_files.hpp"
 
+#include <string>
 #include <utility>
 
 #include <CLI/CLI.hpp>
@@ -9,10 +10,20 @@
 
 namespace arbiter::cli {
 
+CLI::Validator dash_for_input() {
+  return {[](std::string& file) {
+            if (file == "-") file = "/dev/stdin";
+            return std::string();
+          },
+          ""};
+}
+
 CLI::Option& add_model_options(CLI::App& verb, rules::ModelFiles& files) {
   CLI::Option* models =
-      verb.add_option("MODEL", files.models, "Files of behaviours and rules; together one model")
+      verb.add_option("MODEL", files.models,
+                      "Files of behaviours and rules; together one model; -: standard input")
           ->type_name("FILE")
+          ->transform(dash_for_input())
           ->required();
   verb.add_option(
           "--application", files.application,

@@ -10,9 +10,13 @@
 namespace CLI {
 class App;
 class Option;
+class Validator;
 }  // namespace CLI
 
 namespace arbiter::cli {
+
+// Takes "-" for standard input, as -o takes it for standard output.
+CLI::Validator dash_for_input();
 
 // MODEL..., which it gives back, and --application.
 CLI::Option& add_model_options(CLI::App& verb, rules::ModelFiles& files);

@@ -14,9 +14,10 @@
 namespace arbiter::cli {
 
 // What no port can be called is wrong use, whether a daemon runs or not.
-inline CLI::Validator name_of_port() {
-  return {[](std::string& name) -> std::string {
+inline CLI::Validator name_of_port(bool or_pattern = false) {
+  return {[or_pattern](std::string& name) -> std::string {
             if (name.empty()) return "is empty; write a port's name, such as /Arm/pos:o";
+            if (or_pattern && name.find('*') != std::string::npos) return "";
             const auto problem = rules::find_problem_in_port(name);
             return problem ? problem->message : "";
           },

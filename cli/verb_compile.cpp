@@ -1,9 +1,12 @@
 // arbiter compile: the application with the rules of its arbiters merged in.
 #include <filesystem>
+#include <fstream>
 #include <iostream>
+#include <iterator>
 #include <memory>
 #include <stdexcept>
 #include <string>
+#include <system_error>
 
 #include <CLI/CLI.hpp>
 
@@ -22,6 +25,7 @@ struct CompileOptions {
   rules::ModelFiles files;
   std::string output;
   double effort = 1;
+  bool replaces = false;
 };
 
 // The application given; else the one that the model is in already; else one made of the model. All
@@ -61,6 +65,15 @@ void check_by_reading_back(const std::string& content, const rules::RuleSet& rul
   }
 }
 
+// It can be made again, unlike an application that somebody has written.
+bool is_written_by_compile(const std::string& path) {
+  std::error_code unknown;
+  if (!std::filesystem::is_regular_file(path, unknown)) return false;
+  std::ifstream file(path, std::ios::binary);
+  const std::string content(std::istreambuf_iterator<char>(file), {});
+  return content.find(rules::kWrittenByCompile) != std::string::npos;
+}
+
 int compile(const CompileOptions& options) {
   rules::Diagnostics diagnostics;
   const auto model = load_model(options.files, diagnostics, options.effort);
@@ -69,6 +82,7 @@ int compile(const CompileOptions& options) {
   require_no_input(options.output, *model->rules.texts);
   const std::string content = merge(model->rules);
   check_by_reading_back(content, model->rules);
+  if (!is_written_by_compile(options.output)) require_new_file(options.output, options.replaces);
   write_output(options.output, content);
   return 0;
 }
@@ -82,18 +96,21 @@ void add_compile(CLI::App& app, int& exit_code) {
   add_model_options(*verb, options->files);
   add_effort_option(*verb, options->effort);
   verb->add_option("-o,--output", options->output, kOutputHelp)->type_name("FILE");
+  add_force_option(*verb, options->replaces);
   verb->footer(
       "The result is the text of the application file with one more element, <arbitration>, which "
       "holds\nthe rules of each input port. You can use it as an application, and as a model that "
       "decides in\nthe same way. Without --application, the result is a new application with the "
-      "connections that\nthe model configures.\n\n"
+      "connections that\nthe model configures. A file that is there already is replaced only with "
+      "--force, or if\n`arbiter compile` has written it.\n\n"
       "Examples:\n"
       "  arbiter compile search_and_track.xml --application application.xml -o merged.xml\n"
       "  arbiter check merged.xml\n"
       "  arbiterd --model merged.xml\n\n"
       "Exit codes: 0 written; 1 an error in the model, or rules too large to be read again; 2 "
       "wrong use, a file\n"
-      "that cannot be opened or written, or an output that is one of the inputs");
+      "that cannot be opened or written, or an output that is one of the inputs, or is there "
+      "already");
   verb->callback([options, &exit_code] { exit_code = compile(*options); });
 }
 

@@ -69,11 +69,14 @@ int diff(const DiffOptions& options) {
 void add_diff(CLI::App& app, int& exit_code) {
   const auto options = std::make_shared<DiffOptions>();
   CLI::App* verb = app.add_subcommand("diff", "Show in which states two models decide differently");
-  verb->add_option("BEFORE", options->before, "A model; if it has several files: a.xml,b.xml")
+  verb->add_option("BEFORE", options->before,
+                   "A model; if it has several files: a.xml,b.xml; -: standard input")
       ->type_name("FILE")
+      ->transform(dash_for_input())
       ->required();
   verb->add_option("AFTER", options->after, "The model to compare it with")
       ->type_name("FILE")
+      ->transform(dash_for_input())
       ->required();
   verb->add_option("--application", options->application, "Connections of both models")
       ->type_name("FILE");

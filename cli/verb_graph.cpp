@@ -53,11 +53,13 @@ void add_graph(CLI::App& app, int& exit_code) {
                    "ports, rules; both; auto: behaviours if there are any")
       ->check(one_of({"auto", "behaviours", "connections", "both"}))
       ->type_name("WHICH");
-  verb->add_option("--port", options->ports,
-                   "Only what decides at this input port; may be given several times")
-      ->type_name("PORT")
+  verb->add_option(
+          "--port", options->ports,
+          "Only what decides at this input port, or at those that match this pattern, such "
+          "as '/Arm/*'; repeatable")
+      ->type_name("PATTERN")
       ->allow_extra_args(false)
-      ->check(name_of_port());
+      ->check(name_of_port(true));
   verb->add_option("--format", options->format,
                    std::string(kGraphFormats) +
                        "; without it by the ending of the file, svg where it has none")
@@ -88,6 +90,7 @@ void add_graph(CLI::App& app, int& exit_code) {
       "  arbiter graph search_and_track.xml --view connections --application application.xml \\\n"
       "      -o ports.png --dpi 200\n"
       "  arbiter graph search_and_track.xml --port /Gaze/pos:i -o gaze.svg\n"
+      "  arbiter graph humanoid.xml --port '/Arm/*' -o arms.svg\n"
       "  arbiter graph search_and_track.xml --hosts two_hosts.xml -o hosts.svg\n"
       "  arbiter graph --follow -o now.svg\n\n"
       "Exit codes: 0 drawn; 1 an error in the model, a port that it lacks or that is on no host,\n"

@@ -135,7 +135,8 @@ void add_simulate(CLI::App& app, int& exit_code) {
                          "delivered");
   add_model_options(*verb, options->files).required(false);
   auto* trace = verb->add_option("--trace", options->trace, "CSV: t_ns,source or t_ns,source,event")
-                    ->type_name("FILE");
+                    ->type_name("FILE")
+                    ->transform(dash_for_input());
   auto* recording =
       verb->add_option("--recording", options->recording,
                        "In place of a trace: take each decision of a recording again, and compare "

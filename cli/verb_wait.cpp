@@ -75,8 +75,8 @@ std::shared_ptr<watch::Instance> find_instance(const WaitOptions& options,
       const shm::Nanoseconds now = shm::monotonic_now();
       if (!options.timeout || *options.timeout == 0) throw;
       if (now >= deadline) {
-        throw std::runtime_error("timed out after " + seconds_text(*options.timeout) + ": " +
-                                 error.what());
+        throw std::runtime_error("timed out after " + seconds_text(*options.timeout) +
+                                 "; at the last try: " + error.what());
       }
       if (!std::exchange(has_said, true)) {
         std::cerr << "arbiter: no arbiterd of instance "

@@ -81,17 +81,20 @@ bool WhyAnswer::is_sensed(const std::string& source) const {
   return std::find(senses.begin(), senses.end(), source) != senses.end();
 }
 
-void WhyAnswer::check_source() const {
+void WhyAnswer::check_source(const wire::Status& status) const {
   if (options_.source.empty() || !shown_.empty() || is_sensed(options_.source)) return;
   std::vector<std::string_view> known;
   for (const auto& each : explanation_.connections) known.push_back(each.source);
   for (const auto& each : explanation_.senses) known.push_back(each);
   const ModelInForce& model = port_.model();
   const auto other = model.other_that_mentions(port_.name(), options_.source);
+  const bool is_input = status.find_input(options_.source) != nullptr &&
+                        status.find_source(options_.source) == nullptr;
   const std::string advice =
-      other ? "; model \"" + *other + "\" has it: arbiter switch " + *other
-            : rules::advise(options_.source, known,
-                            "a behaviour's <config> or a <select> makes a connection");
+      other      ? "; model \"" + *other + "\" has it: arbiter switch " + *other
+      : is_input ? "; it is an input port: name an output port behind " + port_.name()
+                 : rules::advise(options_.source, known,
+                                 "a behaviour's <config> or a <select> makes a connection");
   throw watch::WatchError("there is no connection from " + options_.source + " to " + port_.name() +
                           ", and its rules do not read it, in " + model.text() +
                           ", which is in force" + advice);
@@ -249,7 +252,7 @@ void write_why(std::ostream& out, const WhyOptions& options,
     const WhyAnswer answer(options, port, std::move(look), std::move(*explanation), status,
                            std::move(fates), std::move(also_open_on), out);
     if (!port.is_whole(snapshot)) continue;  // later models have its place
-    answer.check_source();
+    answer.check_source(status);
     if (options.json) {
       answer.write_json();
     } else {

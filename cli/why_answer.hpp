@@ -30,7 +30,7 @@ class WhyAnswer {
             std::vector<std::string> also_open_on, std::ostream& out);
 
   // Throws Error where the source is none of this port's.
-  void check_source() const;
+  void check_source(const wire::Status& status) const;
   void write_text() const;
   void write_json() const;
 

@@ -36,8 +36,10 @@ void require_no_source(const WhyOptions& options, const wire::Status& status,
   if (status.find_input(options.port) != nullptr) return;
   std::vector<std::string_view> ports;
   for (const wire::InputStatus& input : status.inputs) ports.push_back(input.name);
+  // Whoever has exchanged the two has named the port, too.
+  const bool has_port = status.find_input(options.source) != nullptr;
   const auto command = [&](const std::string& port, const std::string& source) {
-    return command_of(options, port, source);
+    return command_of(options, has_port ? options.source : port, source);
   };
   const auto text =
       rules::about_source_as_port({options.port, none, command}, ports, uses_by(status));

@@ -30,11 +30,6 @@ std::string port_of_topic_among(const auto& ports, const char* how, std::string_
 shm::PortId require_port(Instance& instance, const std::string& name) {
   if (const auto found = instance.find_port(name)) return *found;
   const wire::Status status = instance.status();
-  if (status.find_source(name) != nullptr) {
-    std::string message = name + " is an output port; give the input port first";
-    message += ": arbiter why PORT " + name;
-    throw WatchError(message);
-  }
   if (const std::string port = port_of_topic(status, name); !port.empty()) {
     throw WatchError(name + " is no port: " + port);
   }

@@ -261,6 +261,23 @@ TEST(Check, WhatAMappingFeedsIsPublished) {
   EXPECT_THAT(arbiter(beside).err, testing::Not(HasSubstr("never-published")));
 }
 
+// A mapping is no model: what decides stands there.
+TEST(Check, AdviceOnAMappingIsNotThatOnAModel) {
+  TemporaryDirectory directory;
+  const auto model = directory.write("m.xml", kOverrideModel);
+  const auto err_of = [&](const std::string& attributes, const char* element) {
+    const auto mapping = directory.write("g.xml", "<gateway kind='dds'><" + std::string(element) +
+                                                      " topic='/o' type='a/msg/B' port='/object' " +
+                                                      attributes + "/></gateway>");
+    return arbiter({"check", model, "--gateway", mapping}).err;
+  };
+  EXPECT_THAT(err_of("timeout='1s'", "in"),
+              HasSubstr("; the model says how long a source stays active: write <source port="));
+  EXPECT_THAT(err_of("timeout='1s'", "out"),
+              HasSubstr("no attribute \"timeout\"; it takes port, topic, "));
+  EXPECT_THAT(err_of("priority='1'", "in"), HasSubstr("; the model decides who wins: name there "));
+}
+
 // As docs/importing.md has a lock that is latched: the second source is declared for its T alone.
 TEST(Check, WhatAMappingFeedsIsDeclaredForItsT) {
   TemporaryDirectory directory;

@@ -99,10 +99,11 @@ TEST(Compile, TakesAModelThatCanBeReadOnce) {
                               directory.write("a.xml", kApplication)});
   const auto expected = arbiter({"compile", directory.write("merged.xml", first.out)});
   ASSERT_EQ(expected.exit_code, 0);
-  const auto result =
-      run_program({ARBITER_PROGRAMS "/arbiter", "compile", "/dev/stdin"}, first.out);
-  EXPECT_EQ(result.exit_code, 0) << result.err;
-  EXPECT_EQ(result.out, expected.out);
+  for (const char* const input : {"/dev/stdin", "-"}) {
+    const auto result = run_program({ARBITER_PROGRAMS "/arbiter", "compile", input}, first.out);
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    EXPECT_EQ(result.out, expected.out);
+  }
 }
 
 TEST(Compile, TakesItsOwnResultAgain) {
@@ -194,7 +195,12 @@ TEST(Compile, ReplacesAFileAsAWholeAndKeepsLinksAndModes) {
   fs::permissions(target, fs::perms::owner_read | fs::perms::owner_write);
   const auto link = directory.path() + "/link.xml";
   fs::create_symlink("target.xml", link);
-  EXPECT_EQ(arbiter({"compile", model, "-o", link}).exit_code, 0);
+  const auto refused = arbiter({"compile", model, "-o", link});
+  EXPECT_EQ(refused.exit_code, 2);
+  EXPECT_THAT(refused.err, HasSubstr("/link.xml is there already; nothing was written: give"));
+  EXPECT_EQ(content_of(target), "old");
+  EXPECT_EQ(arbiter({"compile", model, "-o", link, "--force"}).exit_code, 0);
+  EXPECT_EQ(arbiter({"compile", model, "-o", link}).exit_code, 0) << "it wrote that itself";
   EXPECT_TRUE(fs::is_symlink(link));
   EXPECT_THAT(content_of(target), HasSubstr("<arbitration"));
   EXPECT_EQ(fs::status(target).permissions(), fs::perms::owner_read | fs::perms::owner_write);

@@ -189,6 +189,17 @@ TEST(Graph, DrawsOnlyWhatDecidesAtAPort) {
   const auto two = arbiter({"graph", "--port", "/p", "--port", "/q", model, "--format", "dot"});
   EXPECT_THAT(two.out, HasSubstr("Two"));
   EXPECT_THAT(two.out, Not(HasSubstr("Three")));
+  const auto both =
+      arbiter({"graph", "--port", "/p", "--port", "/[pq]*", model, "--format", "dot"});
+  EXPECT_EQ(both.exit_code, 1) << "only * is special";
+  const auto some = arbiter({"graph", "--port", "/r", "--port", "*/r", model, "--format", "dot"});
+  EXPECT_EQ(some.exit_code, 0);
+  EXPECT_THAT(some.out, HasSubstr("Three"));
+  EXPECT_THAT(some.out, Not(HasSubstr("One")));
+  EXPECT_THAT(arbiter({"graph", "--port", "*", model, "--format", "dot"}).out, HasSubstr("One"));
+  const auto no_match = arbiter({"graph", model, "--format", "dot", "--port", "/arm/*"});
+  EXPECT_EQ(no_match.exit_code, 1);
+  EXPECT_THAT(no_match.err, HasSubstr("no input port of the model matches --port '/arm/*'; "));
   const auto none = arbiter({"graph", model, "--format", "dot", "--port", "/s"});
   EXPECT_EQ(none.exit_code, 1);
   EXPECT_THAT(none.err, HasSubstr("no input port /s"));

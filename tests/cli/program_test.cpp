@@ -2,6 +2,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cctype>
+#include <filesystem>
+#include <iterator>
+#include <map>
+#include <regex>
 #include <sstream>
 
 #include "tests/cli/arbiter_program.hpp"
@@ -67,6 +73,69 @@ TEST(Program, HasNoVerbThatTheReadmeDoesNotName) {
     EXPECT_NE(readme.find("`" + verb + "`"), std::string::npos)
         << "README.md does not name " << verb;
   }
+}
+
+// "arbiter why /Gaze/pos:i --follow" in a page, as words: in a block, where it may go on behind a
+// '\\', and between backticks.
+std::vector<std::vector<std::string>> commands_in(const std::string& page) {
+  static const std::regex kInBlock("(?:\\$ )?arbiter ([^#;|&]+).*"), kInText("`arbiter ([^`]+)`");
+  std::vector<std::vector<std::string>> result;
+  const auto add = [&](const std::string& command) {
+    std::istringstream words(command);
+    result.emplace_back(std::istream_iterator<std::string>(words),
+                        std::istream_iterator<std::string>());
+  };
+  std::istringstream lines(page);
+  std::string line, more;
+  for (bool is_block = false; std::getline(lines, line);) {
+    if (line.starts_with("```")) is_block = !is_block;
+    while (is_block && line.ends_with('\\') && std::getline(lines, more)) {
+      line.back() = ' ';
+      line += more;
+    }
+    std::smatch found;
+    if (is_block && std::regex_match(line, found, kInBlock)) add(found[1].str());
+    if (is_block) continue;
+    for (std::sregex_iterator at(line.begin(), line.end(), kInText), end; at != end; ++at) {
+      add((*at)[1].str());
+    }
+  }
+  return result;
+}
+
+// Each verb and each option: a page that is not run with the tests tells what there is, too.
+TEST(Program, HasEachVerbAndOptionThatAPageWrites) {
+  const std::string root = std::string(ARBITER_TEST_DATA) + "/../../";
+  const auto known = verbs();
+  std::map<std::vector<std::string>, std::string> helps;
+  std::vector<std::string> pages{root + "README.md"};
+  for (const auto& entry : std::filesystem::directory_iterator(root + "docs")) {
+    if (entry.path().extension() == ".md") pages.push_back(entry.path().string());
+  }
+  std::size_t count = 0;
+  for (const std::string& page : pages) {
+    for (const auto& words : commands_in(content_of(page))) {
+      SCOPED_TRACE(page + ": arbiter " + testing::PrintToString(words));
+      const bool is_verb = std::islower(static_cast<unsigned char>(words.front().front())) != 0;
+      if (!is_verb || words.front() == "help") continue;  // --help, VERB
+      EXPECT_TRUE(std::find(known.begin(), known.end(), words.front()) != known.end());
+      std::vector<std::string> verb{words.front()};
+      if (verb.front() == "recording" && words.size() > 1) verb.push_back(words[1]);
+      std::string& help = helps[verb];
+      if (help.empty()) {
+        auto asking = verb;
+        asking.emplace_back("--help");
+        help = arbiter(asking).out;
+      }
+      for (const std::string& word : words) {
+        if (!word.starts_with("--")) continue;
+        ++count;
+        const std::string option = word.substr(0, word.find_first_of("=,.)"));
+        EXPECT_NE(help.find(option), std::string::npos) << option;
+      }
+    }
+  }
+  EXPECT_GT(count, 100u) << "does it still read the pages?";
 }
 
 TEST(Program, ExitsWith2WhereItIsUsedWrongly) {

@@ -252,7 +252,9 @@ TEST(Wait, WithoutADaemonOrWithAConditionThatCannotBeReadIsAnError) {
   EXPECT_THAT(result.err, HasSubstr("no arbiterd of instance"));
   result = wait_until("/face", {"--instance", "nobody-has-this-instance", "--timeout", "1ms"});
   EXPECT_EQ(result.exit_code, 1);
-  EXPECT_THAT(result.err, HasSubstr("arbiter: timed out after 0.001 s: no arbiterd of instance"));
+  EXPECT_THAT(result.err,
+              HasSubstr("arbiter: timed out after 0.001 s; at the last try: no arbiterd "
+                        "of instance"));
 }
 
 }  // namespace

@@ -63,6 +63,11 @@ TEST(WhyNames, OfASourceTellsAtWhichPortsItMatters) {
   EXPECT_THAT(arbiter({"why", "/wander"}).err,
               HasSubstr("/wander is an output port, connected to /arm and /base; give the input "
                         "port first: arbiter why /arm /wander"));
+  EXPECT_THAT(arbiter({"why", "/wander", "/base"}).err,
+              HasSubstr("give the input port first: arbiter why /base /wander"))
+      << "the port that was named";
+  EXPECT_THAT(arbiter({"why", "/arm", "/base"}).err,
+              HasSubstr("; it is an input port: name an output port behind /arm"));
   EXPECT_THAT(arbiter({"why", "/stop:o"}).err,
               HasSubstr("/stop:o is an output port, read at /arm and /base; give the input port "
                         "first: arbiter why /arm /stop:o"));
