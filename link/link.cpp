@@ -62,7 +62,7 @@ HostCard own_card(const LinkOptions& options, Incarnation incarnation) {
 
 }  // namespace
 
-Link::Link(LinkOptions options, PeerWatch& peers, Neighbours known)
+Link::Link(LinkOptions options, gateway::dds::PeerWatch& peers, Neighbours known)
     : options_(std::move(options)),
       incarnation_(new_incarnation()),
       view_(options_.instance, options_.max_age),
@@ -153,7 +153,7 @@ bool Link::has_network_changed() {
 std::string Link::change_of_peers() const {
   std::string change = peers_.change();
   const bool are_all_there = desk_->others().cards.size() >= options_.network.peers.size();
-  return are_all_there ? std::string() : change;
+  return are_all_there || change.empty() ? std::string() : "--peer " + change;
 }
 
 void Link::say_what_passes() {
@@ -205,6 +205,7 @@ void Link::join_network(int stop) {
     interfaces_.begin();
     try {
       enter_network();
+      peers_.note_unknown(words.unknown_peers());
       words.tell();  // of peers that have no address, for example
     } catch (const DdsError& error) {
       leave_network();
@@ -239,9 +240,9 @@ NetworkOptions Link::network_there() const {
 }
 
 void Link::enter_network() {
-  const NetworkOptions there = network_there();
-  peers_.accept();
-  // The names of peers are looked up, and a name server may not answer.
+  NetworkOptions there = network_there();
+  there.peers = peers_.accept(there.peers);
+  // The names of other peers are looked up, and a name server may not answer.
   while_seen([&] { network_.emplace(there); });
   tokens_.emplace(*network_, [this](const TokenMessage& message, std::uint64_t writer) {
     held_.note(message.importer, message.number, writer, shm::monotonic_now());

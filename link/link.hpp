@@ -19,6 +19,7 @@
 #include <arbiter/node.hpp>
 
 #include "gateway/core/bridge.hpp"
+#include "gateway/dds/peer_watch.hpp"
 #include "link/core/held_tokens.hpp"
 #include "link/core/neighbours.hpp"
 #include "link/core/patience.hpp"
@@ -32,7 +33,6 @@
 #include "link/host_view.hpp"
 #include "link/import.hpp"
 #include "link/interface_watch.hpp"
-#include "link/peer_watch.hpp"
 #include "link/token_clock.hpp"
 
 namespace arbiter::link {
@@ -54,7 +54,7 @@ struct LinkOptions {
 class Link {
  public:
   // `peers`: those of `options`; outlives it. `known`: the hosts that it knew in an earlier life.
-  Link(LinkOptions options, PeerWatch& peers, Neighbours known);
+  Link(LinkOptions options, gateway::dds::PeerWatch& peers, Neighbours known);
   Link(const Link&) = delete;
   Link& operator=(const Link&) = delete;
   ~Link();
@@ -117,7 +117,7 @@ class Link {
   bool has_said_what_passes_ = false;
   bool stops_ = false;
   InterfaceWatch interfaces_;
-  PeerWatch& peers_;
+  gateway::dds::PeerWatch& peers_;
   // Of sources that were imported and are not wanted now: the model may want them again.
   std::map<std::string, Stream, std::less<>> streams_;
   std::mutex imports_mutex_;

@@ -22,6 +22,7 @@
 #include "command_line/wrong_use.hpp"
 #include "gateway/core/say.hpp"
 #include "gateway/core/stop_signals.hpp"
+#include "gateway/dds/peer_watch.hpp"
 #include "link/link.hpp"
 #include "rules/text/names.hpp"
 #include "shm/file_descriptor.hpp"
@@ -86,9 +87,9 @@ bool is_port(const std::string& text) {
 // Why no address of it is known that links can use: an error of getaddrinfo(); 0: one is. DDS takes
 // ADDRESS:PORT, too.
 int find_no_address(const std::string& peer) {
-  const std::string host = host_of_peer(peer);
+  const std::string host = gateway::dds::host_of_peer(peer);
   if (host.size() != peer.size() && !is_port(peer.substr(host.size() + 1))) return EAI_NONAME;
-  return host.empty() ? EAI_NONAME : look_up(host).error;
+  return host.empty() ? EAI_NONAME : gateway::dds::look_up(host).error;
 }
 
 // Throws CLI::ValidationError. A name server that cannot be asked now is no wrong use: the network
@@ -184,7 +185,7 @@ void serve(const LinkOptions& options, const shm::FileDescriptor& stop) {
   // A program that waits for an answer does not hold up the next link.
   std::vector<std::future<void>> closing;
   Neighbours known;
-  PeerWatch peers(options.network.peers);
+  gateway::dds::PeerWatch peers(options.network.peers);
   for (bool is_first = true;; is_first = false) {
     Link link(options, peers, std::move(known));
     if (is_first) sd_notify(0, "READY=1");

@@ -15,6 +15,8 @@ namespace {
 
 // Often enough for who sends idle samples for a second.
 constexpr shm::Nanoseconds kOpenAgain = 200'000'000;
+// The bell rings for whoever comes and goes. What is left is how things stand.
+constexpr shm::Nanoseconds kStandingPeriod = 500'000'000;
 // For Cyclone to join a domain. What takes longer, such as a name server that is silent, must not
 // hold up the loop.
 constexpr std::chrono::milliseconds kJoinsWithin{100};
@@ -24,10 +26,15 @@ constexpr std::size_t kDescriptorsOfDomain = 32;
 
 // On a thread of its own. Throws DdsError.
 std::unique_ptr<Domain> join_domain(const Gateway& gateway, const std::set<std::string>& topics,
-                                    const Bell& bell) {
+                                    const Bell& bell, PeerWatch& peer_names) {
   const CycloneWords words;
   try {
-    auto domain = std::make_unique<Domain>(gateway, topics, bell);
+    Gateway known = gateway;
+    known.peers = peer_names.accept(gateway.peers);
+    // A configuration may ask for IPv6, of which no address is looked up.
+    const bool may_be_ipv4 = gateway.configuration.empty();
+    auto domain = std::make_unique<Domain>(may_be_ipv4 ? known : gateway, topics, bell);
+    peer_names.note_unknown(words.unknown_peers());
     words.tell();
     return domain;
   } catch (const DdsError&) {
@@ -58,6 +65,7 @@ DdsMiddleware::DdsMiddleware(const std::vector<Mapping>& mappings, const Bell& b
       Site& site = sites_[domain_of(gateway)];
       if (site.gateway == nullptr) {
         site.gateway = &gateway;
+        site.peer_names = std::make_unique<PeerWatch>(gateway.peers);
       } else if (!have_one_configuration(*site.gateway, gateway)) {
         throw DdsError("two gateways of DDS domain " + std::to_string(domain_of(gateway)) +
                        " name different interfaces, peers or configurations; a program has one "
@@ -171,12 +179,19 @@ bool DdsMiddleware::is_joining() const {
                      [](const auto& each) { return each.second.joining.valid(); });
 }
 
+shm::Nanoseconds DdsMiddleware::tend_period() const {
+  const bool are_all_open = std::all_of(
+      sites_.begin(), sites_.end(), [](const auto& each) { return each.second.domain != nullptr; });
+  return are_all_open ? kStandingPeriod : kOpenAgain;
+}
+
 void DdsMiddleware::tend() {
   if (!started_) return;
   const std::uint64_t stops = guard_.stops();
   // To subscribe again, a participant is made, for which Cyclone waits while it joins a domain.
   const bool was_stopped = !is_joining() && std::exchange(stops_, stops) != stops;
   for (Site* const site : order_) {
+    leave_for_new_peers(*site);
     if (!site->domain && !open(*site)) continue;
     try {
       site->domain->peers().update();
@@ -187,6 +202,20 @@ void DdsMiddleware::tend() {
       give_up(*site, error);
     }
   }
+}
+
+// To join again is silence for all of the domain's topics: not where everybody has been found.
+void DdsMiddleware::leave_for_new_peers(Site& site) {
+  if (!site.domain) return;
+  const std::string change = site.peer_names->change();
+  if (change.empty()) return;
+  const bool is_anybody_missing = std::any_of(site.ends.begin(), site.ends.end(),
+                                              [](const EndPoint* end) { return end->is_alone(); });
+  if (!is_anybody_missing) return;
+  say(Level::kWarning, "peers= of DDS domain " + std::to_string(site.domain->id()) + ": " + change +
+                           ": joining the domain again");
+  close(site);
+  site.open_again = 0;
 }
 
 void DdsMiddleware::give_up(Site& site, const DdsError& error) {
@@ -226,7 +255,7 @@ void DdsMiddleware::set_problem(Site& site, const std::string& problem) {
 
 void DdsMiddleware::begin_to_join(Site& site) try {
   std::packaged_task<std::unique_ptr<Domain>()> join(
-      [this, &site] { return join_domain(*site.gateway, site.topics, bell_); });
+      [this, &site] { return join_domain(*site.gateway, site.topics, bell_, *site.peer_names); });
   auto joining = join.get_future();
   site.joiner = std::jthread([this, join = std::move(join)]() mutable {
     join();

@@ -19,6 +19,7 @@
 #include "gateway/dds/latched_samples.hpp"
 #include "gateway/dds/low_descriptors.hpp"
 #include "gateway/dds/out_topic.hpp"
+#include "gateway/dds/peer_watch.hpp"
 #include "gateway/mapping/mapping.hpp"
 
 namespace arbiter::gateway::dds {
@@ -37,8 +38,8 @@ class DdsMiddleware : public Middleware {
   void stop() noexcept override;
   void tend() override;
   [[nodiscard]] bool is_joining() const override;
-  // The bell rings for whoever comes and goes. What is left is how things stand.
-  [[nodiscard]] shm::Nanoseconds tend_period() const override { return 500'000'000; }
+  // Shorter while a domain is to be joined.
+  [[nodiscard]] shm::Nanoseconds tend_period() const override;
 
  private:
   // One domain, which may not be there yet: a network interface that comes later, for example.
@@ -46,6 +47,7 @@ class DdsMiddleware : public Middleware {
     const Gateway* gateway = nullptr;
     std::set<std::string> topics;
     std::vector<const Entry*> entries;
+    std::unique_ptr<PeerWatch> peer_names;
     // It may not be joined yet: Cyclone waits for a name server, perhaps for long.
     std::future<std::unique_ptr<Domain>> joining;
     std::jthread joiner;  // rings once that is ready
@@ -74,6 +76,9 @@ class DdsMiddleware : public Middleware {
   // Until it is tried again.
   void give_up(Site& site, const DdsError& error);
   void close(Site& site) noexcept;
+  // A name in peers= leads elsewhere, and somebody is missing who may be there: leaves the domain,
+  // and says so.
+  void leave_for_new_peers(Site& site);
   // Throws DdsError.
   static void subscribe_again(Site& site);
 

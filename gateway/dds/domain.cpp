@@ -198,6 +198,19 @@ dds_entity_t Domain::participant(End end) {
 CycloneWords::CycloneWords() { kept_words = &lines_; }
 CycloneWords::~CycloneWords() { kept_words = nullptr; }
 
+std::vector<std::string> CycloneWords::unknown_peers() const {
+  constexpr std::string_view kBefore = "add_peer_addresses: ";
+  constexpr std::string_view kBehind = ": unknown address";
+  std::vector<std::string> result;
+  for (const std::string& line : lines_) {
+    const std::size_t before = line.find(kBefore);
+    if (before == line.npos || !line.ends_with(kBehind)) continue;
+    const std::size_t begin = before + kBefore.size();
+    result.push_back(line.substr(begin, line.size() - kBehind.size() - begin));
+  }
+  return result;
+}
+
 void CycloneWords::tell() const {
   for (const std::string& line : lines_) say(Level::kWarning, "Cyclone DDS: " + line);
 }

@@ -61,6 +61,8 @@ class CycloneWords {
 
   // Empty: it has said nothing.
   [[nodiscard]] std::string last() const { return lines_.empty() ? "" : lines_.back(); }
+  // Those of whom it says that it knows no address, as they were given.
+  [[nodiscard]] std::vector<std::string> unknown_peers() const;
   // The calls did not fail: what it has said is said as a warning.
   void tell() const;
 

@@ -30,6 +30,8 @@ class EndPoint {
   void open(Domain& domain);
   void close() noexcept;
   [[nodiscard]] bool is_open() const { return static_cast<bool>(end_); }
+  // Open, and nobody has been matched.
+  [[nodiscard]] bool is_alone() const { return is_open() && matched() == 0; }
 
   // Takes account of who is out there: opens it again with or without a key where nothing else
   // would match, takes on ROS 2's type hash, and says who does not match, and why.

@@ -20,11 +20,12 @@
 #include <utility>
 #include <vector>
 
+#include "gateway/dds/peer_watch.hpp"
 #include "link/dds/host_search.hpp"
-#include "link/peer_watch.hpp"
 #include "shm/file_descriptor.hpp"
 #include "tests/link/cabled_robot.hpp"
 #include "tests/link/robot.hpp"
+#include "tests/support/await.hpp"
 
 namespace arbiter::test {
 namespace {
@@ -167,19 +168,19 @@ TEST_F(Cable, ANameThatGetsAnAddressLaterIsLookedUpAgain) {
 }
 
 TEST(PeerAddresses, ChangeWhereNoneOfThoseIsLeftThatThereWere) {
-  link::PeerAddresses peers;
+  gateway::dds::PeerAddresses peers;
   peers.note("base", {"10.0.0.1", "10.0.0.2"});
   EXPECT_EQ(peers.change(1), "");
   peers.note("base", {"10.0.0.2", "10.0.0.3"});
   EXPECT_EQ(peers.change(1), "");
   peers.note("base", {"10.0.0.3"});
-  EXPECT_EQ(peers.change(1), "--peer base has the address 10.0.0.3 now");
+  EXPECT_EQ(peers.change(1), "base has the address 10.0.0.3 now");
   peers.accept(1);
   EXPECT_EQ(peers.change(60'000'000'001), "");
 }
 
 TEST(PeerAddresses, AreThoseOfBeforeWhereNobodyKnowsThemNow) {
-  link::PeerAddresses peers;
+  gateway::dds::PeerAddresses peers;
   peers.note("base", {"10.0.0.1"});
   peers.note("base", {});
   peers.accept(1);
@@ -188,16 +189,31 @@ TEST(PeerAddresses, AreThoseOfBeforeWhereNobodyKnowsThemNow) {
 }
 
 TEST(PeerAddresses, AreNewWhereThereWereNone) {
-  link::PeerAddresses peers;
+  gateway::dds::PeerAddresses peers;
   peers.note("base", {});
   EXPECT_EQ(peers.change(1), "");
   peers.note("base", {"10.0.0.1"});
-  EXPECT_EQ(peers.change(1), "--peer base has the address 10.0.0.1 now");
+  EXPECT_EQ(peers.change(1), "base has the address 10.0.0.1 now");
+}
+
+// A name server that has answered before may be silent while DDS joins, and answer again later.
+TEST(PeerAddresses, AreNewWhereDdsHasFoundNone) {
+  gateway::dds::PeerAddresses peers;
+  peers.note("base", {"10.0.0.1"});
+  peers.accept(1);
+  EXPECT_EQ(peers.change(1), "");
+  peers.note_unknown("base");
+  EXPECT_EQ(peers.change(1), "base has the address 10.0.0.1 now");
+  peers.note_unknown("head");  // nobody has looked it up yet
+  EXPECT_EQ(peers.change(1), "base has the address 10.0.0.1 now");
+  peers.accept(1);
+  peers.note("head", {"10.0.0.2"});
+  EXPECT_EQ(peers.change(60'000'000'001), "head has the address 10.0.0.2 now");
 }
 
 // Each time the link joins its network again, and is silent for a while.
 TEST(PeerAddresses, ChangeOnceAMinuteAtMost) {
-  link::PeerAddresses peers;
+  gateway::dds::PeerAddresses peers;
   peers.note("base", {"10.0.0.1"});
   peers.accept(1);
   peers.note("base", {"10.0.0.2"});
@@ -208,10 +224,22 @@ TEST(PeerAddresses, ChangeOnceAMinuteAtMost) {
   EXPECT_NE(peers.change(60'000'000'002), "");
 }
 
+// A name server that has answered may be silent when DDS joins again.
+TEST(PeerAddresses, TakeThePlaceOfNamesOnceTheyAreKnown) {
+  const std::vector<std::string> peers{"localhost:7410", "10.0.0.1:7410", "nobody.invalid"};
+  gateway::dds::PeerWatch watch(peers);
+  std::vector<std::string> given;
+  await([&] {
+    given = watch.accept(peers);
+    return given.front() != peers.front();
+  });
+  EXPECT_EQ(given, (std::vector<std::string>{"127.0.0.1:7410", "10.0.0.1:7410", "nobody.invalid"}));
+}
+
 TEST(PeerAddresses, AreOfNamesAlone) {
-  EXPECT_EQ(link::name_of_peer("10.0.0.1"), "");
-  EXPECT_EQ(link::name_of_peer("10.0.0.1:7410"), "");
-  EXPECT_EQ(link::name_of_peer("base.local:7410"), "base.local");
+  EXPECT_EQ(gateway::dds::name_of_peer("10.0.0.1"), "");
+  EXPECT_EQ(gateway::dds::name_of_peer("10.0.0.1:7410"), "");
+  EXPECT_EQ(gateway::dds::name_of_peer("base.local:7410"), "base.local");
 }
 
 }  // namespace

@@ -1,16 +1,22 @@
-// A name server that does not answer.
+// A name server that does not answer, or answers later.
+#include <dds/dds.h>
 #include <dlfcn.h>
 #include <gtest/gtest.h>
 #include <netdb.h>
 #include <poll.h>
+#include <sys/socket.h>
 
 #include <chrono>
 #include <condition_variable>
 #include <cstring>
+#include <functional>
 #include <mutex>
 #include <string>
+#include <vector>
 
 #include "gateway/dds/dds_middleware.hpp"
+#include "gateway/dds/entity.hpp"
+#include "gateway/dds/opaque_type.hpp"
 #include "tests/gateway/dds/own_domain.hpp"
 #include "tests/gateway/foreign.hpp"
 #include "tests/gateway/mapping_text.hpp"
@@ -19,20 +25,40 @@
 namespace {
 
 constexpr const char* kSilent = "silent.example";
+constexpr const char* kLater = "later.example";
 
+struct Questions {
+  int by_us = 0;
+  int by_dds = 0;
+};
 struct NameServer {
   std::mutex mutex;
   std::condition_variable changed;
   bool is_asked = false;  // and has not answered
   bool answers = false;
-  int given_up = 0;  // how often somebody has waited to the end
+  int given_up = 0;              // how often somebody has waited to the end
+  std::string address_of_later;  // empty: it has none yet
+  Questions about_later;
 };
 NameServer& name_server() {
   static NameServer& one = *new NameServer;
   return one;
 }
 
+std::vector<std::string> configurations;  // of the domains that were joined
+
 }  // namespace
+
+// Called in place of Cyclone's.
+extern "C" dds_entity_t dds_create_domain(dds_domainid_t domain, const char* configuration) {
+  static const auto real =
+      reinterpret_cast<decltype(&dds_create_domain)>(::dlsym(RTLD_NEXT, "dds_create_domain"));
+  {
+    const std::lock_guard lock(name_server().mutex);
+    configurations.emplace_back(configuration);
+  }
+  return real(domain, configuration);
+}
 
 // Cyclone calls it in place of the C library's. So long that nobody waits for it by chance, and not
 // for ever, so that who does wait fails.
@@ -49,6 +75,14 @@ extern "C" int getaddrinfo(const char* node, const char* service, const addrinfo
   }
   static const auto real =
       reinterpret_cast<decltype(&getaddrinfo)>(::dlsym(RTLD_NEXT, "getaddrinfo"));
+  if (node != nullptr && std::strcmp(node, kLater) == 0) {
+    const std::lock_guard lock(name_server().mutex);
+    // Cyclone does not say for what kind of socket.
+    Questions& asked = name_server().about_later;
+    ++(hints != nullptr && hints->ai_socktype == SOCK_DGRAM ? asked.by_us : asked.by_dds);
+    const std::string& address = name_server().address_of_later;
+    return address.empty() ? EAI_AGAIN : real(address.c_str(), service, hints, result);
+  }
   return real(node, service, hints, result);
 }
 
@@ -60,6 +94,9 @@ class DdsNames : public ::testing::Test {
   void SetUp() override {
     name_server().answers = false;
     name_server().given_up = 0;
+    name_server().address_of_later.clear();
+    name_server().about_later = {};
+    configurations.clear();
   }
   ~DdsNames() override { answer(); }
 
@@ -71,6 +108,21 @@ class DdsNames : public ::testing::Test {
   static int given_up() {
     const std::lock_guard lock(name_server().mutex);
     return name_server().given_up;
+  }
+  static Questions questions() {
+    const std::lock_guard lock(name_server().mutex);
+    return name_server().about_later;
+  }
+  // As each domain was configured.
+  static std::vector<std::string> joined() {
+    const std::lock_guard lock(name_server().mutex);
+    return configurations;
+  }
+  // How often we had asked before.
+  static int give_address() {
+    const std::lock_guard lock(name_server().mutex);
+    name_server().address_of_later = "127.0.0.2";
+    return name_server().about_later.by_us;
   }
   static void await_question() {
     test::await([] {
@@ -113,8 +165,10 @@ TEST_F(DdsNames, ANameServerThatIsSilentHoldsUpItsDomainAndNotTheLoop) {
   await_question();
   EXPECT_EQ(given_up(), 0) << "the loop has waited for it";
   EXPECT_EQ(send(sender), Sender::Result::kNotReady);
+  const shm::Nanoseconds before = middleware.tend_period();
   answer();
   tend_until_sent(bell_, middleware, sender);
+  EXPECT_LT(before, middleware.tend_period()) << "to join is tried again soon";
 }
 
 // Cyclone joins one domain after the other.
@@ -141,6 +195,44 @@ TEST_F(DdsNames, ADomainThatHasNoNamesIsServedThoughTheNameServerOfAnotherIsSile
   EXPECT_EQ(given_up(), 0) << "it has waited for the other";
   EXPECT_EQ(send(of_named), Sender::Result::kNotReady);
   answer();  // or its end would wait
+}
+
+// Somebody else's reader of that topic.
+Entity reader_of_topic(const Entity& participant) {
+  ddsi_sertype* type = make_opaque_type("B", false);
+  const dds_entity_t topic =
+      dds_create_topic_sertype(participant.get(), "T", &type, nullptr, nullptr, nullptr);
+  return {dds_create_reader(participant.get(), topic, nullptr, nullptr), "a reader"};
+}
+
+// That is silence for all of its topics.
+TEST_F(DdsNames, ADomainIsJoinedAgainForAnAddressThatComesLaterOnceSomebodyIsMissing) {
+  const test::OwnDomain number;
+  const Read read = read_text(gateway_of(number, "/Base:i", "peers='later.example'"));
+  const std::vector<Mapping> mappings{read.mapping};
+  DdsMiddleware middleware(mappings, bell_, latched_);
+  Account account(read.entry().outside(), "subscriber");
+  Sender& sender = middleware.sender(read.mapping.gateways.front(), read.entry(), account);
+  middleware.start({}, {});
+  bell_.ring();
+  tend_until_sent(bell_, middleware, sender);
+  const auto tend_until = [&](const std::function<bool()>& holds) {
+    test::await([&] {
+      middleware.tend();
+      return holds();
+    });
+  };
+  {
+    const Entity participant(dds_create_participant(number.number(), nullptr, nullptr), "another");
+    const Entity reader = reader_of_topic(participant);
+    tend_until([&] { return account.state().find("1 subscriber matched") != std::string::npos; });
+    const int before = give_address();
+    tend_until([&] { return questions().by_us > before + 1; });  // the one before has been answered
+    EXPECT_EQ(joined().size(), 1u);
+  }
+  tend_until([&] { return joined().size() == 2 && send(sender) == Sender::Result::kSent; });
+  EXPECT_NE(joined().back().find("127.0.0.2"), std::string::npos);
+  EXPECT_EQ(questions().by_dds, 1) << "a name server may be silent again";
 }
 
 }  // namespace

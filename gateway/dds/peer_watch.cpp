@@ -1,4 +1,4 @@
-#include "link/peer_watch.hpp"
+#include "gateway/dds/peer_watch.hpp"
 
 #include <arpa/inet.h>
 #include <netdb.h>
@@ -17,7 +17,7 @@
 
 #include "shm/clock.hpp"
 
-namespace arbiter::link {
+namespace arbiter::gateway::dds {
 namespace {
 
 constexpr std::chrono::seconds kBetweenLooks{5};
@@ -54,6 +54,14 @@ void PeerAddresses::accept(shm::Nanoseconds now) {
   for (auto& [name, place] : places_) place.joined = place.now;
 }
 
+std::set<std::string> PeerAddresses::known(const std::string& name) const {
+  const auto place = places_.find(name);
+  return place == places_.end() ? std::set<std::string>() : place->second.now;
+}
+
+// Even if somebody has found one meanwhile, or finds the same as before.
+void PeerAddresses::note_unknown(const std::string& name) { places_[name].joined.clear(); }
+
 std::string PeerAddresses::change(shm::Nanoseconds now) const {
   return now < quiet_until_ ? std::string() : change_of_any();
 }
@@ -65,7 +73,7 @@ std::string PeerAddresses::change_of_any() const {
         std::any_of(place.now.begin(), place.now.end(),
                     [&](const std::string& address) { return place.joined.contains(address); });
     if (is_any_left || place.now.empty()) continue;
-    return "--peer " + each.first + " has the address " + *place.now.begin() + " now";
+    return each.first + " has the address " + *place.now.begin() + " now";
   }
   return {};
 }
@@ -119,9 +127,26 @@ PeerWatch::~PeerWatch() {
   shared_->news.notify_one();
 }
 
-void PeerWatch::accept() {
+std::vector<std::string> PeerWatch::accept(const std::vector<std::string>& peers) {
   const std::lock_guard lock(shared_->mutex);
   shared_->addresses.accept(shm::monotonic_now());
+  std::vector<std::string> result;
+  for (const std::string& peer : peers) {
+    const std::string name = name_of_peer(peer);
+    const std::set<std::string> known = shared_->addresses.known(name);
+    for (const std::string& each : known) result.push_back(each + peer.substr(name.size()));
+    if (known.empty()) result.push_back(peer);
+  }
+  return result;
+}
+
+void PeerWatch::note_unknown(const std::vector<std::string>& peers) {
+  const std::lock_guard lock(shared_->mutex);
+  for (const std::string& peer : peers) {
+    if (const std::string name = name_of_peer(peer); !name.empty()) {
+      shared_->addresses.note_unknown(name);
+    }
+  }
 }
 
 std::string PeerWatch::change() const {
@@ -129,4 +154,4 @@ std::string PeerWatch::change() const {
   return shared_->addresses.change(shm::monotonic_now());
 }
 
-}  // namespace arbiter::link
+}  // namespace arbiter::gateway::dds

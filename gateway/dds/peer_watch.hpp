@@ -1,9 +1,9 @@
-// Whether the names of hosts that multicast does not reach (--peer) lead where they led when the
-// link joined its network.
+// Whether the names of hosts that multicast does not reach (--peer of a link, peers= of a gateway)
+// lead where they led when a domain of DDS was joined.
 //
 // DDS looks a name up when it joins, and never again. Where a name server answers only later, or a
-// host has got another address, hosts would stay apart until somebody starts a link again. So names
-// are looked up now and then, on a thread: a name server may be silent for long.
+// host has got another address, hosts would stay apart until somebody starts a program again. So
+// names are looked up now and then, on a thread: a name server may be silent for long.
 #pragma once
 
 #include <map>
@@ -14,18 +14,23 @@
 
 #include "shm/activity.hpp"
 
-namespace arbiter::link {
+namespace arbiter::gateway::dds {
 
 // What names lead to. Thread safety: one thread.
 class PeerAddresses {
  public:
   // `addresses`: none, and the name cannot be looked up now, which changes nothing.
   void note(const std::string& name, std::set<std::string> addresses);
-  // What they lead to now is what the link goes by from now on.
+  // DDS is about to join: what they lead to now is what it goes by from now on.
   void accept(shm::Nanoseconds now);
-  // What has changed since, as a sentence; empty: nothing. Where a name has several addresses
-  // nobody knows which one DDS uses: it has changed once it has none of those that it had. A minute
-  // passes between two changes: a name may lead elsewhere each time that somebody asks.
+  // Of a name; empty: none is known.
+  [[nodiscard]] std::set<std::string> known(const std::string& name) const;
+  // It has joined, and has found no address of this one.
+  void note_unknown(const std::string& name);
+  // What has changed since: "base has the address 10.0.0.3 now"; empty: nothing. Where a name has
+  // several addresses nobody knows which one DDS uses: it has changed once it has none of those
+  // that it had. A minute passes between two changes: a name may lead elsewhere each time that
+  // somebody asks.
   [[nodiscard]] std::string change(shm::Nanoseconds now) const;
 
  private:
@@ -41,7 +46,7 @@ class PeerAddresses {
 
 struct LookedUp {
   int error = 0;                    // of getaddrinfo()
-  std::set<std::string> addresses;  // of IPv4, as links use them
+  std::set<std::string> addresses;  // of IPv4, as links and Cyclone use them
 };
 // Waits for a name server.
 [[nodiscard]] LookedUp look_up(const std::string& host);
@@ -60,7 +65,11 @@ class PeerWatch {
   // Does not wait for a name server.
   ~PeerWatch();
 
-  void accept();
+  // As PeerAddresses has it. What DDS is to be given: `peers`, with addresses in place of the names
+  // of which some are known. So to join again needs no name server, which may be silent by then.
+  [[nodiscard]] std::vector<std::string> accept(const std::vector<std::string>& peers);
+  // `peers`: as DDS was given them.
+  void note_unknown(const std::vector<std::string>& peers);
   [[nodiscard]] std::string change() const;
 
  private:
@@ -68,4 +77,4 @@ class PeerWatch {
   const std::shared_ptr<Shared> shared_;
 };
 
-}  // namespace arbiter::link
+}  // namespace arbiter::gateway::dds
