@@ -81,15 +81,23 @@ void OutTopic::on_matched(const dds_publication_matched_status_t& status) noexce
   bell_.ring();  // who has gone is to be told, too
 }
 
+bool OutTopic::may_wait() noexcept {
+  const std::lock_guard lock(in_use());
+  return !has_waited_in_vain_;
+}
+
 Sender::Result OutTopic::send(Bytes sample) noexcept {
   Result result = send_at_once(sample);
   if (result != Result::kBusy) return result;
-  // Cyclone has asked for acknowledgements.
-  dds_wait_for_acks(end().get(), kMaxBlocking);
-  result = send_at_once(sample);
-  if (result != Result::kBusy) return result;
+  if (may_wait()) {
+    // Cyclone has asked for acknowledgements.
+    dds_wait_for_acks(end().get(), kMaxBlocking);
+    result = send_at_once(sample);
+    if (result != Result::kBusy) return result;
+  }
   {
     const std::lock_guard lock(in_use());
+    has_waited_in_vain_ = true;
     keep_untold(sample);
   }
   return refuse("a subscriber does not keep up: a sample was not sent, the writer was full");
@@ -163,6 +171,7 @@ Sender::Result OutTopic::write(Payload& payload) noexcept {
   const shm::Nanoseconds begin = is_measured ? shm::monotonic_now() : 0;
   const dds_return_t written = dds_writecdr(end().get(), &payload.cyclone);
   if (written == DDS_RETCODE_OK) {
+    has_waited_in_vain_ = false;
     if (sent) last_ = std::move(sent);
     if (is_measured) pace_.note(size, shm::monotonic_now() - begin);
     return Result::kSent;

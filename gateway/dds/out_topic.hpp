@@ -36,7 +36,9 @@ class OutTopic : public EndPoint, public Sender {
   // For an entry like this. Null: there is none, or whoever begins anew sends the idle sample.
   [[nodiscard]] LastSample take_last() noexcept;
 
-  // Waits a little for subscribers that do not keep up. The gateway's loop.
+  // Waits a little for subscribers that do not keep up; after it has waited in vain, not again
+  // until something could be sent: one that is cut off must not hold up the loop with each sample.
+  // The gateway's loop.
   [[nodiscard]] Result send(Bytes sample) noexcept override;
   [[nodiscard]] Result send_at_once(Bytes sample) noexcept override;
   [[nodiscard]] std::size_t largest_at_once() const noexcept override { return pace_.largest(); }
@@ -53,6 +55,8 @@ class OutTopic : public EndPoint, public Sender {
   void catch_up() noexcept override;
   // On Cyclone's threads.
   void on_matched(const dds_publication_matched_status_t& status) noexcept;
+  // Whether send() may, for room.
+  [[nodiscard]] bool may_wait() noexcept;
   // Why a sample cannot be written; empty: it can. With in_use(), as the next one.
   std::optional<Result> obstacle(Bytes sample) noexcept;
   // Was not sent, but is what those are to be told who come later: not the one before. With
@@ -69,6 +73,7 @@ class OutTopic : public EndPoint, public Sender {
   // That was sent, or was to be sent while this was closed or had no room, if the entry latches;
   // with in_use().
   LastSample last_;
+  bool has_waited_in_vain_ = false;  // of send(), for room; with in_use()
   // Of whoever has the entry's turn, as is note() of the next one.
   Payload* draft_ = nullptr;
   bool is_draft_begun_ = false;  // Cyclone counts references to it

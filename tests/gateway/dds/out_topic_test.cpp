@@ -1,6 +1,7 @@
 // Which samples the thread that receives them may send, and what a latched topic keeps.
 #include "gateway/dds/out_topic.hpp"
 
+#include <dlfcn.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -15,6 +16,20 @@
 #include "tests/gateway/dds/scene.hpp"
 #include "tests/gateway/mapping_text.hpp"
 #include "tests/support/await.hpp"
+
+namespace {
+
+int waits_for_acks = 0;
+
+}  // namespace
+
+// Called in place of Cyclone's.
+extern "C" dds_return_t dds_wait_for_acks(dds_entity_t writer, dds_duration_t timeout) {
+  static const auto real =
+      reinterpret_cast<decltype(&dds_wait_for_acks)>(::dlsym(RTLD_NEXT, "dds_wait_for_acks"));
+  ++waits_for_acks;
+  return real(writer, timeout);
+}
 
 namespace arbiter::gateway::dds {
 namespace {
@@ -214,6 +229,24 @@ TEST_F(Latched, WhatTheWriterHadNoRoomForIsThereOnceItHas) {
     topic_->look_at({});
     return given().back() == two_;
   });
+}
+
+// The gateway's loop waits, and with it all ports: a subscriber that is cut off may be there for as
+// long as its lease says.
+TEST_F(Latched, AWriterThatHasWaitedInVainDoesNotWaitAgainUntilThereIsRoom) {
+  make("qos='latched' history='keep_all'");
+  const std::string large = one_ + std::string(kMiB, '.');
+  test::Stranger slow = subscriber();
+  for (int time = 1; time <= 2; ++time) {
+    slow.process().stop();
+    while (send(large) == Sender::Result::kSent) continue;
+    const int waits = waits_for_acks;
+    for (int i = 0; i < 10; ++i) EXPECT_EQ(send(two_), Sender::Result::kRefused);
+    EXPECT_EQ(waits_for_acks, waits);
+    EXPECT_GE(waits, time);
+    slow.process().resume();
+    test::await([&] { return send(two_) == Sender::Result::kSent; });
+  }
 }
 
 // A base that comes then must not drive off by a command of before.
