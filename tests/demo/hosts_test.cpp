@@ -5,6 +5,7 @@
 
 #include <fstream>
 #include <map>
+#include <optional>
 #include <set>
 #include <string>
 
@@ -53,30 +54,59 @@ TEST(TwoHosts, WithoutNetworksOfTheirOwnALinkIsStopped) {
   expect_as_the_page_says(demo, result);
 }
 
+class TwoHostsKilled : public ::testing::Test {
+ protected:
+  // The demo on the loopback interface, in so many seconds.
+  void begin(const std::string& seconds) {
+    session_.emplace(of_hosts(demo_, {"--lines", "--loopback", "--seconds", seconds, "--domain",
+                                      std::to_string(domain_.number())}),
+                     24, 100);
+  }
+  // Returns once the demo has written the one, and then the other.
+  void await_lines(const std::string& first, const std::string& second) {
+    session_->watch_until([&] {
+      const std::string& written = session_->written();
+      const auto at = written.find(first);
+      return at != std::string::npos && written.find(second, at) != std::string::npos;
+    });
+  }
+  void kill_all() const {
+    for (const auto& [pid, program] : demo_.own()) {
+      if (program != "hosts-demo") ::kill(pid, SIGKILL);
+    }
+  }
+  void expect_all_to_come_back() {
+    EXPECT_EQ(session_->watch_to_the_end(), 0) << session_->written();
+    for (const char* const program :
+         {"head: arbiterd", "head: arbiter-link", "head: object-detector", "body: arbiterd",
+          "body: arbiter-link", "body: rest-arm", "body: arm-control"}) {
+      EXPECT_THAT(session_->written(), HasSubstr(std::string(program) + " is dead"));
+      EXPECT_THAT(session_->written(), HasSubstr(std::string(program) + " is there again"));
+    }
+    EXPECT_THAT(demo_.processes(), IsEmpty());
+    EXPECT_THAT(demo_.files_left(), IsEmpty());
+  }
+
+ private:
+  const Demo demo_{};
+  const OwnDomain domain_;
+  std::optional<TerminalSession> session_;
+};
+
 // Whatever is killed comes back, and the scene goes on.
-TEST(TwoHosts, AnyProcessMayBeKilled) {
-  const Demo demo;
-  const OwnDomain domain;
-  TerminalSession session(of_hosts(demo, {"--lines", "--loopback", "--seconds", "30", "--domain",
-                                          std::to_string(domain.number())}),
-                          24, 100);
-  session.watch_until([&] {
-    const auto again = session.written().find("It is started again");
-    return again != std::string::npos &&
-           session.written().find("/Arm/pos:i  /Object/pos:o", again) != std::string::npos;
-  });
-  for (const auto& [pid, program] : demo.own()) {
-    if (program != "hosts-demo") ::kill(pid, SIGKILL);
-  }
-  EXPECT_EQ(session.watch_to_the_end(), 0) << session.written();
-  for (const char* const program :
-       {"head: arbiterd", "head: arbiter-link", "head: object-detector", "body: arbiterd",
-        "body: arbiter-link", "body: rest-arm", "body: arm-control"}) {
-    EXPECT_THAT(session.written(), HasSubstr(std::string(program) + " is dead"));
-    EXPECT_THAT(session.written(), HasSubstr(std::string(program) + " is there again"));
-  }
-  EXPECT_THAT(demo.processes(), IsEmpty());
-  EXPECT_THAT(demo.files_left(), IsEmpty());
+TEST_F(TwoHostsKilled, AnyProcessMayBeKilled) {
+  begin("30");
+  await_lines("It is started again", "/Arm/pos:i  /Object/pos:o");
+  kill_all();
+  expect_all_to_come_back();
+}
+
+// When they come back, the scene's time has passed.
+TEST_F(TwoHostsKilled, TheSceneWaitsForWhoIsKilledAtItsEnd) {
+  begin("20");
+  await_lines("The object is gone", "/Arm/pos:i  /RestArm/pos:o");
+  kill_all();
+  expect_all_to_come_back();
 }
 
 TEST(TwoHosts, ThePictureShowsWhoIsWhere) {

@@ -1,13 +1,15 @@
 #include "cast.hpp"
 
-#include <algorithm>
+#include <limits>
 
 namespace hosts_demo {
 namespace {
 
+constexpr double kNoEnd = std::numeric_limits<double>::infinity();
+
 bool commands(const Reigns& reigns, std::string_view source, Interval when) {
   for (std::size_t i = 0; i < reigns.size(); ++i) {
-    const double until = i + 1 < reigns.size() ? reigns[i + 1].since : kSceneSeconds;
+    const double until = i + 1 < reigns.size() ? reigns[i + 1].since : kNoEnd;
     if (reigns[i].source == source && reigns[i].since < when.to && until > when.from) return true;
   }
   return false;
@@ -23,7 +25,7 @@ bool is_as_the_page_says(const Reigns& arm, double pace) {
          !commands(arm, kObjectPort, cut) && commands(arm, kObjectPort, {kCable.to, kLink.from}) &&
          commands(arm, kRestPort, dead) && !commands(arm, kObjectPort, dead) &&
          commands(arm, kObjectPort, {kLink.to, kObject.to}) &&
-         commands(arm, kRestPort, {kObject.to, kSceneSeconds});
+         commands(arm, kRestPort, {kObject.to, kNoEnd});
 }
 
 }  // namespace hosts_demo
