@@ -11,6 +11,7 @@
 #include <map>
 #include <mutex>
 #include <optional>
+#include <set>
 #include <string>
 #include <thread>
 #include <utility>
@@ -68,6 +69,11 @@ class PlayedMiddleware : public Middleware {
     const std::lock_guard lock(mutex_);
     return sender_.sent;
   }
+  // Whether this thread has sent something.
+  [[nodiscard]] bool has_sent_here() {
+    const std::lock_guard lock(mutex_);
+    return sender_.senders.count(std::this_thread::get_id()) != 0;
+  }
   [[nodiscard]] bool serves(const std::string& source) {
     const std::lock_guard lock(mutex_);
     return ins_.count(source) != 0;
@@ -99,9 +105,11 @@ class PlayedMiddleware : public Middleware {
     [[nodiscard]] Result send(Bytes sample) noexcept override {
       const std::lock_guard lock(mutex_);
       sent.emplace_back(reinterpret_cast<const char*>(sample.data()), sample.size());
+      senders.insert(std::this_thread::get_id());
       return Result::kSent;
     }
     std::vector<std::string> sent;
+    std::set<std::thread::id> senders;
 
    private:
     std::mutex& mutex_;

@@ -31,6 +31,17 @@ TEST(Bridging, WhatKeepsATopicFromWorkingIsTroubleInTheStatus) {
 }
 
 // What a topic that keeps samples brings may be an arrival only where T is for ever.
+// The loop sends the first one, and each that comes while it has its turn.
+TEST(Bridging, TheThreadThatDeliversASampleSendsIt) {
+  const test::Daemon daemon(kDriving);
+  Running gateway;
+  await([&] { return gateway.middleware.serves("/Nav/cmd:o"); });
+  await([&] {
+    gateway.middleware.deliver("/Nav/cmd:o", "go");
+    return gateway.middleware.has_sent_here();
+  });
+}
+
 TEST(Bridging, TheMiddlewareLooksWithTheTOfTheModelInForce) {
   const auto model = [](bool is_forever) {
     return std::string("<behaviors timeout='") + (is_forever ? "forever" : "60s") +

@@ -65,6 +65,8 @@ TEST_F(Arriving, ASampleIsDeliveredByOneCopyAsTheTypeThatTheMappingNames) {
   ASSERT_TRUE(taken);
   EXPECT_EQ(std::string(reinterpret_cast<const char*>(taken->data()), taken->size()), "hello");
   EXPECT_EQ(account_.passed.value(), 1u);
+  account_.look(1);
+  EXPECT_THAT(account_.text(), testing::HasSubstr("has 5 bytes"));
 }
 
 TEST_F(Arriving, AComponentOfAnotherTypeIsRefused) {
@@ -309,6 +311,21 @@ TEST_F(ArrivingRelease, WhatIsNoBooleanEndsIt) {
   say('\0');
   EXPECT_EQ(say('\2'), Fate::kUnreadable);
   EXPECT_FALSE(is_active("/released:o"));
+}
+
+// Of the other one.
+TEST_F(ArrivingRelease, WhatIsNoBooleanEndsAPressToo) {
+  const Read press = read_dds("<in topic='/estop' type='std_msgs/msg/Bool' true='/pressed:o'/>");
+  Incoming incoming(node_, press.entry(), account_);
+  const auto say_here = [&](char value) {
+    return incoming.deliver(BytesSample(std::string("\0\1\0\0", 4) + value, 4), kNever);
+  };
+  for (const char other : {'\2', '\0'}) {
+    EXPECT_EQ(say_here('\1'), Fate::kPassed);
+    EXPECT_TRUE(is_active("/pressed:o"));
+    EXPECT_EQ(say_here(other), other == '\0' ? Fate::kPassed : Fate::kUnreadable);
+    EXPECT_FALSE(is_active("/pressed:o"));
+  }
 }
 
 TEST_F(ArrivingRelease, OfANumberBelowAThresholdToo) {

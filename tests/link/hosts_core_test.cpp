@@ -136,6 +136,24 @@ TEST(NeighbouringHosts, ThatNameTheMostPortsLoseThemWhereAllAreTooMany) {
   EXPECT_GT(names, Neighbours::kMostNames - 2 * kMaxPortsOfCard) << "no more than have to";
 }
 
+// Whose cards have become longer since they came.
+TEST(NeighbouringHosts, ThatNameMorePortsThanBeforeLoseThem) {
+  std::vector<std::string> many;
+  for (std::size_t i = 0; i < kMaxPortsOfCard; ++i)
+    many.push_back("/" + std::to_string(10'000 + i));
+  Neighbours neighbours;
+  constexpr std::size_t kMoreThanFit = Neighbours::kMostNames / kMaxPortsOfCard + 1;
+  for (const auto& outputs : {std::vector<std::string>{"/b:o"}, many}) {
+    for (std::size_t i = 0; i < kMoreThanFit; ++i) {
+      neighbours.note(1 + i, host_card("crowd" + std::to_string(i), 1 + i, {}, outputs), kS);
+    }
+  }
+  std::size_t names = 0;
+  for (const Neighbour& each : neighbours.all()) names += each.card->outputs.size();
+  EXPECT_EQ(neighbours.all().size(), kMoreThanFit);
+  EXPECT_LE(names, Neighbours::kMostNames);
+}
+
 std::vector<std::string> names_of(const Neighbours& neighbours) {
   std::vector<std::string> names;
   for (const Neighbour& each : neighbours.all()) {

@@ -31,7 +31,8 @@ EventHeader some_header() {
 }
 
 ByteString written(const EventHeader& header) {
-  ByteString bytes(header_bytes(header));
+  // As memory is that has been used before.
+  ByteString bytes(header_bytes(header), std::byte{0xff});
   write_header(header, WritableBytes(bytes.data(), bytes.size()));
   bytes.resize(bytes.size() + header.length, std::byte{0x55});
   return bytes;
@@ -94,6 +95,17 @@ TEST(EventHeader, IsNobodysWhereItContradictsItself) {
     EventHeader header = some_header();
     spoil(header);
     EXPECT_FALSE(reads(written(header)));
+  }
+}
+
+TEST(EventHeader, OfEachKindIsReadWhereItIsConsistent) {
+  for (const EventKind kind : {EventKind::kSignal, EventKind::kWithheld, EventKind::kUnsent,
+                               EventKind::kDeactivation, EventKind::kState}) {
+    EventHeader header = some_header();
+    header.kind = kind;
+    header.length = 0;
+    header.is_deactivated = kind == EventKind::kDeactivation;
+    EXPECT_TRUE(reads(written(header))) << static_cast<int>(kind);
   }
 }
 

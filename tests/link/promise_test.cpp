@@ -48,6 +48,12 @@ TEST(Promise, EndsAfterTwoSecondsWithoutACommit) {
   EXPECT_EQ(promise.keep(kOther, 6 + Promise::kHolds), "rest");
 }
 
+TEST(Promise, ThatHasEndedIsNoneWhoeverAsks) {
+  Promise promise;
+  promise.promise(kOne, "dance", 5);
+  EXPECT_FALSE(promise.is_promised(5 + Promise::kHolds));
+}
+
 TEST(Promise, AskedForTwiceItHoldsNoLonger) {
   Promise promise;
   promise.promise(kOne, "dance", 0);

@@ -150,6 +150,8 @@ TEST(RoundTrip, KnowsABoundedNumberOfOthersAndForgetsThoseThatAreSilent) {
   EXPECT_EQ(me.next(2 * kS).echoes.size(), kMaxEchoes);
   const ByteString largest = write_pulse(me.next(2 * kS));
   EXPECT_TRUE(read_pulse(as_bytes(largest)));
+  EXPECT_FALSE(read_pulse(as_bytes(write_pulse({0, 1, {}})))) << "nobody's";
+  EXPECT_FALSE(read_pulse(as_bytes(write_pulse({1, 0, {}})))) << "none";
   EXPECT_THAT(me.next(kS + RoundTrips::kSilence).echoes, IsEmpty());
 }
 
