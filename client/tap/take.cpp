@@ -204,10 +204,21 @@ void TapCore::count_round(Stream& stream) noexcept {
   if (++stream.taken == stream.source->shape.events) stream.taken = 0;
 }
 
+// What a publisher tells first has no time of its own: it waits until all has been told of those
+// who had the port before.
+bool TapCore::has_predecessor(const Stream& stream) const noexcept {
+  return std::any_of(streams_.data(), &stream, [&](const Stream& before) {
+    return before.gone && !before.ended && before.source->name == stream.source->name;
+  });
+}
+
 TapCore::Stream* TapCore::oldest() noexcept {
   Stream* oldest = nullptr;
+  bool is_behind_end = false;  // one of those before goes
   for (Stream& stream : streams_) {
-    if (!look_at(stream)) continue;
+    const bool has_news = look_at(stream) && !(is_behind_end && has_predecessor(stream));
+    is_behind_end = is_behind_end || (stream.gone && !stream.ended);
+    if (!has_news) continue;
     if (oldest == nullptr || order_of_head(stream) < order_of_head(*oldest)) oldest = &stream;
   }
   return oldest;

@@ -184,6 +184,7 @@ class TapCore {
   void disbelieve(Stream& stream) noexcept;
   static void be_state(shm::EventRecord& head) noexcept;
   void give_up(Stream& stream, std::uint64_t lost) noexcept;
+  [[nodiscard]] bool has_predecessor(const Stream& stream) const noexcept;
   Stream* oldest() noexcept;
   [[nodiscard]] static shm::Nanoseconds order_of_head(const Stream& stream) noexcept;
   static void count_round(Stream& stream) noexcept;

@@ -8,6 +8,7 @@
 #include <optional>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include <arbiter/arbiter.hpp>
 
@@ -37,6 +38,32 @@ TEST(Tap, FollowsASourceThatClosesAndComesAgain) {
     EXPECT_EQ(wait_for_kind(tap, TapEventKind::closed).sequence(), 2u);
   }
   EXPECT_EQ(tap.lost(), 0u);
+}
+
+// Of what happened while it did not look.
+TEST(Tap, HearsOfASuccessorBehindTheEndOfThePortBefore) {
+  Daemon daemon(single_model());
+  Node watcher("watcher");
+  Node node("test");
+  auto tap = watcher.tap("/out");
+  std::vector<TapEventKind> kinds;
+  const auto look = [&] {
+    while (const auto event = tap.take()) kinds.push_back(event->kind());
+  };
+  std::vector<TapEventKind> expected;
+  for (int i = 0; i < 2; ++i) {
+    auto out = node.output_port<Number>("/out");
+    out.signal();
+    expected.insert(expected.end(),
+                    {TapEventKind::state, TapEventKind::signal, TapEventKind::closed});
+  }
+  // The watcher's service thread hears of both while it opens a port of its own.
+  const auto own = watcher.output_port<Number>("/own");
+  await([&] {
+    look();
+    return kinds.size() >= expected.size();
+  });
+  EXPECT_EQ(kinds, expected);
 }
 
 TEST(Tap, IsToldTheActivityThatASourceHasOnceItsPortIsGone) {
