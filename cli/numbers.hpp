@@ -12,6 +12,7 @@ using command_line::number_between;
 using command_line::one_of;
 using command_line::read_time;
 using command_line::read_time_above_zero;
+using command_line::read_time_within;
 using command_line::whole_number_between;
 
 }  // namespace arbiter::cli

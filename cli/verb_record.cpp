@@ -246,10 +246,7 @@ void add_record(CLI::App& app, int& exit_code) {
   verb->add_option_function<std::string>(
           "--period",
           [options](const std::string& text) {
-            options->period = read_time("--period", text);
-            if (options->period < 100'000 || options->period > 1'000'000'000) {
-              throw CLI::ValidationError("--period", "must be 100us to 1s");
-            }
+            options->period = read_time_within("--period", text, 100'000, 1'000'000'000);
           },
           "How often taps are read (default 1ms): what happened closer together than this may be "
           "of unknown order")

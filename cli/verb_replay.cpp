@@ -117,7 +117,7 @@ int replay(const ReplayVerb& verb) {
   if (replayed.samples != 0 && replayed.delivered == 0) {
     std::cout << "none was delivered: "
               << (replayed.refused != 0     ? "input ports refused them; arbiter status says why"
-                  : replayed.discarded != 0 ? "others won at each input port"
+                  : replayed.discarded != 0 ? "they won at no input port; arbiter why says why"
                                             : "no input port that they are connected to is open")
               << '\n';
   }

@@ -210,10 +210,8 @@ void add_top(CLI::App& app, int& exit_code) {
   verb->add_option_function<std::string>(
           "--interval",
           [options](const std::string& text) {
-            options->interval = read_time("--interval", text);
-            if (options->interval < kOneSecond / 50 || options->interval > 60 * kOneSecond) {
-              throw CLI::ValidationError("--interval", "must be 20ms to 60s");
-            }
+            options->interval =
+                read_time_within("--interval", text, kOneSecond / 50, 60 * kOneSecond);
           },
           "How often the screen changes: 20ms to 60s, by default 100ms")
       ->type_name("DURATION");

@@ -1,6 +1,7 @@
 #include "evidence/recorded.hpp"
 
 #include <algorithm>
+#include <cstdint>
 #include <string>
 #include <utility>
 
@@ -26,11 +27,13 @@ class Loader {
   std::vector<Run> finish(Nanoseconds until) {
     if (!runs_.empty()) run().end = std::max(run().end, until);
     for (std::size_t i = 1; i < runs_.size(); ++i) leave_out_strangers(runs_[i - 1], runs_[i]);
+    const auto by_time = [](const Decision& one, const Decision& other) {
+      return one.arrival().time < other.arrival().time;
+    };
     for (Run& run : runs_) {
-      std::stable_sort(run.decisions.begin(), run.decisions.end(),
-                       [](const Decision& one, const Decision& other) {
-                         return one.arrival().time < other.arrival().time;
-                       });
+      auto& all = run.decisions;
+      const bool is_sorted = std::is_sorted(all.begin(), all.end(), by_time);
+      if (!is_sorted) std::stable_sort(all.begin(), all.end(), by_time);  // takes memory
     }
     return std::move(runs_);
   }
@@ -66,18 +69,19 @@ class Loader {
   }
 
   void add(Arrival&& each) {
-    SourceHistory& history = add_step(*each.context, {each.time, each.seen, each.word,
-                                                      Step::Kind::arrival, false, each.generation});
+    SourceHistory& history =
+        add_step(*each.context,
+                 {each.time, each.seen, each.word, Step::Kind::arrival, false, 0, each.generation});
     history.word = each.word;
     const auto step = static_cast<std::uint32_t>(history.steps.size() - 1);
     run().decisions.push_back(
-        {&history, step, std::move(each.context), each.sequence, each.is_sample, each.masks});
+        {&history, step, each.is_sample, std::move(each.context), each.sequence, each.masks});
   }
 
   void add(Deactivation&& each) {
     SourceHistory& history =
         add_step(*each.context, {each.time, each.seen, shm::deactivation(each.time),
-                                 Step::Kind::deactivation, false, each.generation});
+                                 Step::Kind::deactivation, false, 0, each.generation});
     history.word = shm::deactivated(history.word, each.time);
   }
 
@@ -91,8 +95,8 @@ class Loader {
     // It is tapped now; the step below stands behind the gap.
     if (each.why != SourceState::Why::page) history.unknown_from = shm::kForever;
     if (is_known && each.lost == 0) return;
-    Step step{each.time, each.seen,       each.word, Step::Kind::state,
-              false,     each.generation, each.lost};
+    const auto lost = static_cast<std::uint32_t>(std::min<std::uint64_t>(each.lost, UINT32_MAX));
+    Step step{each.time, each.seen, each.word, Step::Kind::state, false, lost, each.generation};
     if (each.why == SourceState::Why::page) {
       // Of one that cannot be tapped, pages tell some of its steps.
       step.is_behind_gap = history.unknown_from != shm::kForever;

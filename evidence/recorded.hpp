@@ -1,9 +1,11 @@
 // A recording in memory: what each source did, what was decided, and by which models.
 //
-// It takes some 200 bytes for each arrival; payloads are not read.
+// It takes some 130 bytes for each arrival, in pieces: nothing is copied as it grows. Payloads are
+// not read.
 #pragma once
 
 #include <cstdint>
+#include <deque>
 #include <map>
 #include <string>
 #include <vector>
@@ -21,12 +23,12 @@ struct Step {
   ActivityWord word = shm::kNeverActive;
   Kind kind = Kind::arrival;
   bool is_behind_gap = false;  // between the step before and this one anything may have happened
+  std::uint32_t lost = 0;      // events between the two, where this one is a state
   std::uint64_t generation = 0;
-  std::uint64_t lost = 0;  // events between the step before and this one, which is a state
 };
 
 struct SourceHistory {
-  std::vector<Step> steps;  // in the source's order
+  std::deque<Step> steps;  // in the source's order
   // What its page says after them: to deactivate once more is a step, and leaves it.
   shm::ActivityWord word = shm::kNeverActive;
   // From then on it could not be tapped, and still cannot.
@@ -37,21 +39,26 @@ struct SourceHistory {
 struct Decision {
   const SourceHistory* source = nullptr;
   std::uint32_t step = 0;  // of it
+  bool is_sample = false;
   ContextPtr context;
   std::uint64_t sequence = 0;
-  bool is_sample = false;
   shm::Masks masks{};
 
   [[nodiscard]] const Step& arrival() const { return source->steps[step]; }
 };
 
-// From a start to the next, or to the end of the file.
+// From a start to the next, or to the end of the file. Its decisions point into it: a copy's would
+// point elsewhere, and a vector that grows copies what may throw where it moves.
 struct Run {
+  Run() = default;
+  Run(Run&&) noexcept = default;
+  Run& operator=(Run&&) noexcept = default;
+
   Nanoseconds start = 0;
   Nanoseconds end = 0;
   std::vector<std::string> ports;  // patterns of those that were chosen; empty: all
   std::map<std::string, SourceHistory> sources;
-  std::vector<Decision> decisions;              // by time
+  std::deque<Decision> decisions;               // by time
   std::map<std::uint64_t, ModelChange> models;  // by generation
   std::vector<WinnerChange> winners;            // as they were recorded
   std::vector<PortChange> port_changes;         // of input ports, as they were recorded

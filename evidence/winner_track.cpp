@@ -8,6 +8,12 @@
 #include "shm/port_picture.hpp"
 
 namespace arbiter::evidence {
+namespace {
+
+// What comes later than so long after a reading is taken for what came after it.
+constexpr Nanoseconds kLatestNews = 60'000'000'000;
+
+}  // namespace
 
 void WinnerTrack::start(Nanoseconds time) {
   now_ = time;
@@ -20,6 +26,7 @@ void WinnerTrack::start(Nanoseconds time) {
   looked_.clear();
   ends_ = {};
   noted_.clear();
+  readings_.clear();
 }
 
 void WinnerTrack::set_rules(std::shared_ptr<const RuleTable> rules, std::uint64_t generation,
@@ -45,6 +52,7 @@ void WinnerTrack::set_rules(std::shared_ptr<const RuleTable> rules, std::uint64_
 void WinnerTrack::apply(const std::string& source, ActivityWord word, Nanoseconds time,
                         WinnerChange::Why why) {
   advance(time);
+  if (is_before_reading(source, word, time)) return;
   if (shm::is_active(word, now_)) {
     words_[source] = word;
   } else {
@@ -64,20 +72,46 @@ void WinnerTrack::apply(const std::string& source, ActivityWord word, Nanosecond
   }
 }
 
-// Arrivals are told; a deactivation may be an operator's, of which nobody tells.
+void WinnerTrack::read(const std::string& source, ActivityWord word) {
+  readings_.erase(source);
+  const bool is_over = shm::is_deactivation(word);
+  apply(source, word, is_over ? shm::time_of(word, shm::kForever) : 0, WinnerChange::Why::state);
+  if (word != shm::kNeverActive) note_reading(source, word);
+}
+
 void WinnerTrack::join(const std::string& source, ActivityWord word) {
+  const Nanoseconds timeout = this->timeout(source);
+  const bool has_unknown_time = shm::is_finite(word) && timeout == shm::kForever;
+  const Nanoseconds time = has_unknown_time ? now_ : shm::time_of(word, timeout);
+  const bool is_told = !shm::is_deactivation(word) && time > now_;
+  if (!is_told && !is_before_reading(source, word, time)) read(source, word);
+}
+
+Nanoseconds WinnerTrack::timeout(const std::string& source) const {
   const shm::SourceId id = rules_ == nullptr ? shm::kNone : rules_->source(source);
-  if (id != shm::kNone) {
-    const ActivityWord before = by_id_[id];
-    const Nanoseconds timeout = rules_->table.timeout(id);
-    const bool has_unknown_time = shm::is_finite(word) && timeout == shm::kForever;
-    if (!has_unknown_time && shm::time_of(word, timeout) > now_) {
-      if (!shm::is_deactivation(word) || !shm::is_active(before, now_)) return;
-      word = shm::time_of(word, timeout);
-      if (shm::is_finite(before)) word = std::min(word, before);
-    }
-  }
-  apply(source, word, 0, WinnerChange::Why::state);
+  return id == shm::kNone ? shm::kForever : rules_->table.timeout(id);
+}
+
+void WinnerTrack::note_reading(const std::string& source, ActivityWord word) {
+  readings_.insert_or_assign(source, Reading{word, now_});
+  if (readings_.size() <= 2 * kept_readings_) return;
+  std::erase_if(readings_,
+                [this](const auto& each) { return each.second.at < now_ - kLatestNews; });
+  kept_readings_ = std::max(readings_.size(), kFewReadings);
+}
+
+// Told late. Of an activity whose T is not known it is not known when it began.
+bool WinnerTrack::is_before_reading(const std::string& source, ActivityWord word,
+                                    Nanoseconds time) {
+  const auto reading = readings_.find(source);
+  if (reading == readings_.end()) return false;
+  const ActivityWord read = reading->second.word;
+  const Nanoseconds timeout = shm::is_finite(read) ? this->timeout(source) : shm::kForever;
+  const bool has_unknown_time = shm::is_finite(read) && timeout == shm::kForever;
+  if (shm::is_deactivation(word)) time = std::max(time, shm::time_of(word, timeout));
+  if (!has_unknown_time && time < shm::time_of(read, timeout)) return true;
+  readings_.erase(reading);
+  return false;
 }
 
 // At the moment of its end an activity is over.

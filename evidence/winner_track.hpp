@@ -33,7 +33,10 @@ class WinnerTrack {
                  Nanoseconds time);
   // An event at a source, after which its activity is `word`.
   void apply(const std::string& source, ActivityWord word, Nanoseconds time, WinnerChange::Why why);
-  // What a publisher finds where it begins to tell: what has made it so may be told behind it.
+  // Its page says so, or its publisher, where that begins to tell. What has made it so, or was
+  // before, may be told behind it: that changes nothing any more.
+  void read(const std::string& source, ActivityWord word);
+  // The second. An arrival that is to come yet is told.
   void join(const std::string& source, ActivityWord word);
   // Time has passed.
   void advance(Nanoseconds time);
@@ -50,6 +53,10 @@ class WinnerTrack {
   void look_where(shm::SourceId source, Nanoseconds time, WinnerChange::Why why,
                   const std::string& by);
   void note_end(const std::string& source, ActivityWord word);
+  void note_reading(const std::string& source, ActivityWord word);
+  [[nodiscard]] bool is_before_reading(const std::string& source, ActivityWord word,
+                                       Nanoseconds time);
+  [[nodiscard]] Nanoseconds timeout(const std::string& source) const;
   [[nodiscard]] const std::string& name_of_source(shm::SourceId source) const;
 
   const std::function<void(WinnerChange&&)> tell_;
@@ -66,6 +73,14 @@ class WinnerTrack {
   using End = std::pair<Nanoseconds, std::string>;
   std::priority_queue<End, std::vector<End>, std::greater<>> ends_;
   std::unordered_map<std::string, Nanoseconds> noted_;
+  // Where nothing has been told of later yet: names may come and go.
+  struct Reading {
+    ActivityWord word;
+    Nanoseconds at;
+  };
+  static constexpr std::size_t kFewReadings = 1024;
+  std::unordered_map<std::string, Reading> readings_;
+  std::size_t kept_readings_ = kFewReadings;  // when it was last looked which are old
 };
 
 }  // namespace arbiter::evidence

@@ -20,10 +20,14 @@ constexpr Nanoseconds kWaitForLate = 200'000'000;
 constexpr std::size_t kMostHeldBack = std::size_t{16} << 20;
 
 // By which records are ordered. What a publisher says of its source counts for the last arrival:
-// where some were lost, one that is later than all that has been told.
+// where some were lost, one that is later than all that has been told. Where it begins to tell, an
+// operator may have deactivated its source since.
 Nanoseconds key_of(const Record& record) {
   if (const auto* state = std::get_if<evidence::SourceState>(&record)) {
-    return state->why == evidence::SourceState::Why::page ? state->seen : state->time;
+    if (state->why == evidence::SourceState::Why::page) return state->seen;
+    const bool is_over =
+        state->why == evidence::SourceState::Why::joined && shm::is_deactivation(state->word);
+    return is_over ? shm::time_of(state->word, shm::kForever) : state->time;
   }
   if (std::holds_alternative<evidence::DestinationsChange>(record)) return 0;
   return evidence::time_of(record);
@@ -31,9 +35,12 @@ Nanoseconds key_of(const Record& record) {
 
 }  // namespace
 
+// A page may be read before the tap tells of what was before.
 void TimeOrder::add(RecordPtr record, Nanoseconds now) {
   Nanoseconds key = std::min(key_of(*record), now);
-  if (const auto* context = evidence::context_of(*record)) {
+  const auto* state = std::get_if<evidence::SourceState>(record.get());
+  const bool is_page = state != nullptr && state->why == evidence::SourceState::Why::page;
+  if (const auto* context = evidence::context_of(*record); context != nullptr && !is_page) {
     Nanoseconds& last = last_[context->source];
     key = last = std::max(last, key);
   }
@@ -121,10 +128,16 @@ void Pipeline::follow(const Record& record) {
     winners_.apply(over->context->source, shm::deactivation(over->time), over->time,
                    Why::deactivation);
   } else if (const auto* state = std::get_if<evidence::SourceState>(&record)) {
-    if (state->why == evidence::SourceState::Why::joined) {
-      winners_.join(state->context->source, state->word);
-    } else {
-      winners_.apply(state->context->source, state->word, state->time, Why::state);
+    switch (state->why) {
+      case evidence::SourceState::Why::page:
+        winners_.read(state->context->source, state->word);
+        break;
+      case evidence::SourceState::Why::joined:
+        winners_.join(state->context->source, state->word);
+        break;
+      case evidence::SourceState::Why::gap:
+      case evidence::SourceState::Why::closed:
+        winners_.apply(state->context->source, state->word, state->time, Why::state);
     }
   } else if (const auto* model = std::get_if<evidence::ModelChange>(&record)) {
     winners_.set_rules(model->table, model->generation, model->time);

@@ -22,8 +22,8 @@
 
 namespace arbiter::recorder {
 
-// Each source's records stay in their order; across sources they are ordered by time, as far as
-// they have come before the horizon.
+// What a source tells stays in its order; across sources, and with what is read of pages, records
+// are ordered by time, as far as they have come before the horizon.
 class TimeOrder {
  public:
   // `now`: what bears a later time, whatever its publisher's clock may be, is not held back for it.

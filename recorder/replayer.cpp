@@ -99,7 +99,7 @@ void Replayer::survey() {
   }
   for (shm::PortId port = 0; port < simulation.port_names().size(); ++port) {
     shm::for_each_heeded(simulation.table(), port, [&](shm::SourceId id) {
-      sources_of_ports_[simulation.port_name(port)].push_back(simulation.source_name(id));
+      sources_of_ports_[simulation.port_name(port)].insert(simulation.source_name(id));
     });
   }
 }
@@ -123,10 +123,7 @@ void Replayer::survey(const Record& record) {
     source.type.size = std::max(source.type.size, context->size);
   }
   for (const std::string& port : context->destinations) {
-    auto& all = sources_of_ports_[port];
-    if (std::find(all.begin(), all.end(), context->source) == all.end()) {
-      all.push_back(context->source);
-    }
+    sources_of_ports_[port].insert(context->source);
   }
   if (arrival != nullptr) {
     source.has_events = true;
@@ -166,11 +163,9 @@ void Replayer::choose() {
 
 bool Replayer::is_at_chosen_port(const std::string& source) const {
   if (options_.ports.empty()) return true;
-  for (const auto& [port, sources] : sources_of_ports_) {
-    const bool is_there = std::find(sources.begin(), sources.end(), source) != sources.end();
-    if (is_there && fits(options_.ports, port)) return true;
-  }
-  return false;
+  return std::any_of(sources_of_ports_.begin(), sources_of_ports_.end(), [&](const auto& each) {
+    return each.second.contains(source) && fits(options_.ports, each.first);
+  });
 }
 
 void Replayer::refuse_without_payloads(const Excepted& is_excepted) const {

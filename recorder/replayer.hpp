@@ -106,7 +106,7 @@ class Replayer {
 
   const ReplayOptions& options_;
   std::map<std::string, Source> sources_;
-  std::map<std::string, std::vector<std::string>> sources_of_ports_;
+  std::map<std::string, std::set<std::string>> sources_of_ports_;
   std::optional<evidence::ModelChange> model_;  // the first
   // Those that the recorder has only seen in the state that they have left, as an operator's.
   std::vector<evidence::Deactivation> untold_;

@@ -173,7 +173,7 @@ void Watcher::begin() {
   for (const std::string& text : refused) options_.say(text);
   Batch states;
   for (auto& [source, watched] : sources_) {
-    if (instance_->find_source(source)) add_page_state(source, page_word(source), states);
+    if (instance_->find_source(source)) add_page_state(source, states);
   }
   Batch start;
   start.is_start = true;
@@ -238,7 +238,7 @@ void Watcher::tap_newcomers(const std::set<std::string>& sources, Batch& batch) 
   for (const std::string& source : sources) {
     if (sources_.count(source) != 0) continue;
     open_tap(source, batch);
-    if (instance_->find_source(source)) add_page_state(source, page_word(source), batch);
+    if (instance_->find_source(source)) add_page_state(source, batch);
   }
   for (const std::string& text : take_refusals()) options_.say(text);
 }
@@ -311,12 +311,19 @@ ActivityWord Watcher::page_word(std::optional<shm::SourceId> id) const {
   return activity == nullptr ? shm::kNeverActive : shm::SeenActivity::of(*activity).word;
 }
 
-void Watcher::add_page_state(const std::string& source, ActivityWord word, Batch& batch) const {
+void Watcher::add_page_state(const std::string& source, Batch& batch) const {
+  const ActivityWord word = page_word(source);
+  add_page_state(source, word, shm::monotonic_now(), batch);
+}
+
+// `seen`: read from the clock once the page had said so.
+void Watcher::add_page_state(const std::string& source, ActivityWord word, Nanoseconds seen,
+                             Batch& batch) const {
   auto context = std::make_shared<SourceContext>();
   context->source = source;
   SourceState state;
   state.context = std::move(context);
-  state.seen = shm::monotonic_now();
+  state.seen = seen;
   state.generation = generation_;
   state.word = believable(word, state.seen);
   if (shm::is_deactivation(state.word)) state.time = shm::time_of(state.word, shm::kForever);
@@ -333,7 +340,8 @@ void Watcher::find_ids() {
 
 // What nobody tells: an operator deactivates a source whose port is closed; a publisher dies
 // between its arrival and telling of it. Where somebody tells, it may be that the tap was not
-// polled since; so the page is believed once a whole poll has told nothing.
+// polled since; so the page is believed once a whole poll has told nothing. It was so when it was
+// seen first: what a tap tells afterwards may be older, or of later.
 void Watcher::look_at_pages() {
   if (memory_ == nullptr) return;  // another daemon has come, and was busy
   find_ids();
@@ -343,6 +351,7 @@ void Watcher::look_at_pages() {
     const ActivityWord word = page_word(watched.id);
     const auto polled = tap == nullptr ? TapReader::Polled{} : tap->polled();
     if (polled.is_live || word != watched.seen) watched.polls = polled.polls;
+    if (word != watched.seen || watched.seen_at == 0) watched.seen_at = shm::monotonic_now();
     watched.seen = word;
     if (polled.is_live) continue;
     const bool is_new = word != watched.reported && (tap == nullptr || word != tap->told());
@@ -350,7 +359,7 @@ void Watcher::look_at_pages() {
     // cannot be tapped nobody else tells.
     const bool is_sure = tap == nullptr || polled.polls >= watched.polls + 2;
     if (!is_new || !is_sure) continue;
-    add_page_state(source, word, batch);
+    add_page_state(source, word, watched.seen_at, batch);
     watched.reported = word;
   }
   if (!batch.records.empty()) push(std::move(batch));

@@ -87,7 +87,9 @@ class Watcher {
   void push(Batch&& batch);
   void hand_over_taps();
   void hand_over_start(Batch&& start);
-  void add_page_state(const std::string& source, evidence::ActivityWord word, Batch& batch) const;
+  void add_page_state(const std::string& source, Batch& batch) const;
+  void add_page_state(const std::string& source, evidence::ActivityWord word, Nanoseconds seen,
+                      Batch& batch) const;
   [[nodiscard]] evidence::ActivityWord page_word(const std::string& source) const;
   [[nodiscard]] evidence::ActivityWord page_word(std::optional<shm::SourceId> id) const;
   void find_ids();
@@ -111,8 +113,10 @@ class Watcher {
     Nanoseconds next_try = 0;
     Nanoseconds pause = 0;            // before that try
     std::optional<shm::SourceId> id;  // as find_ids() has found it
-    // Of the page: what it said last, and what was put into the queue.
+    // Of the page: what it said last, the first look that found it so, and what was put into the
+    // queue.
     evidence::ActivityWord seen = shm::kNeverActive;
+    Nanoseconds seen_at = 0;
     evidence::ActivityWord reported = shm::kNeverActive;
     std::uint64_t polls = 0;  // of the tap, when that was seen first
   };

@@ -162,6 +162,10 @@ TEST(Program, SaysInWordsWhichValuesThereAre) {
             "--view: \"all\" is not auto, behaviours, connections or both");
   EXPECT_EQ(error({"winners", "--every", "1ms"}), "--every: must be at least 2ms");
   EXPECT_EQ(error({"top", "--interval", "1ms"}), "--interval: must be 20ms to 60s");
+  EXPECT_EQ(error({"record", "-o", "x.mcap", "--period", "2s"}), "--period: must be 100us to 1s");
+  for (const char* text : {"Inf", "forever"}) {
+    EXPECT_THAT(error({"record", "-o", "x.mcap", "--period", text}), HasSubstr("; write a whole"));
+  }
   EXPECT_EQ(error({"why", "In:i"}),
             "PORT: a port's name begins with '/'; write \"/In:i\" for \"In:i\"");
 }

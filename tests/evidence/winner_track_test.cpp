@@ -118,21 +118,45 @@ TEST_F(TrackedWinners, WhatComesLateCountsFromItsTimeOn) {
   EXPECT_EQ(told().back(), "250 /high arrival /high");
 }
 
-// The recorder was stopped: it reads first what a publisher has found since, and then its events.
 TEST_F(TrackedWinners, WhatAPublisherFindsMayBeOfLater) {
   arrive("/low", 300);
   track_.join("/high", 600 + 500);
-  track_.join("/low", shm::deactivation(700));
   EXPECT_EQ(told(), (Lines{"300 /low arrival /low"}));
-  arrive("/low", 400);
   track_.advance(1000);
-  EXPECT_EQ(told(), (Lines{"900 - expiry /low"}));
-  arrive("/low", 1100);
-  track_.join("/low", shm::deactivation(1200));
-  track_.advance(1300);
-  EXPECT_EQ(told(), (Lines{"1100 /low arrival /low", "1200 - expiry /low"}));
-  track_.join("/high", 1250 + 500);
-  EXPECT_EQ(told().back(), "1300 /high state /high");
+  EXPECT_EQ(told(), (Lines{"800 - expiry /low"}));
+  track_.join("/high", 900 + 500);
+  EXPECT_EQ(told(), (Lines{"1000 /high state /high"}));
+}
+
+// An operator has ended it, and what was before is told behind that.
+TEST_F(TrackedWinners, WhatWasBeforeADeactivationDoesNotUndoIt) {
+  arrive("/low", 300);
+  track_.join("/low", shm::deactivation(700));
+  arrive("/low", 400);
+  track_.apply("/low", 450 + 500, 450, Why::state);
+  track_.advance(800);
+  EXPECT_EQ(told(), (Lines{"300 /low arrival /low", "700 - deactivation /low"}));
+  arrive("/low", 850);
+  EXPECT_EQ(told(), (Lines{"850 /low arrival /low"}));
+}
+
+// A tap tells of a burst long after the page of its source was read.
+TEST_F(TrackedWinners, WhatWasBeforeAPageWasReadChangesNothing) {
+  arrive("/low", 900);
+  track_.advance(1000);
+  track_.read("/high", 990 + 500);
+  EXPECT_EQ(told(), (Lines{"900 /low arrival /low", "1000 /high state /high"}));
+  track_.apply("/high", 300 + 500, 300, Why::state);
+  arrive("/high", 310);
+  track_.apply("/high", shm::deactivation(320), 320, Why::deactivation);
+  arrive("/high", 990);
+  EXPECT_EQ(told(), Lines{});
+  track_.apply("/high", shm::deactivation(1100), 1100, Why::deactivation);
+  EXPECT_EQ(told(), (Lines{"1100 /low deactivation /high"}));
+  track_.advance(1150);
+  track_.read("/high", 1150 + 500);
+  track_.read("/high", shm::deactivation(1200));
+  EXPECT_EQ(told(), (Lines{"1150 /high state /high", "1200 /low deactivation /high"}));
 }
 
 }  // namespace

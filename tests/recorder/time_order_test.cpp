@@ -61,6 +61,55 @@ TEST(TimeOrder, WhatStandsBehindAGapWaitsForItsTime) {
   EXPECT_EQ(times, (std::vector<evidence::Nanoseconds>{50, 100, 150, 160}));
 }
 
+// The recorder was stopped: it looks at a page before the tap has reached the publisher.
+TEST(TimeOrder, WhatAPageSaysStandsBehindWhatWasBefore) {
+  recorder::TimeOrder order;
+  auto context = std::make_shared<evidence::SourceContext>();
+  context->source = "/fast";
+  const auto add = [&](auto record, evidence::Nanoseconds time) {
+    record.context = context;
+    record.time = time;
+    order.add(std::make_shared<const evidence::Record>(std::move(record)), 1000);
+  };
+  evidence::SourceState page;
+  page.seen = 300;
+  add(page, 0);
+  evidence::SourceState gap;
+  gap.why = evidence::SourceState::Why::gap;
+  gap.seen = 200;
+  add(gap, 200);
+  add(evidence::Arrival{}, 250);
+  add(evidence::Arrival{}, 350);
+  std::vector<evidence::Nanoseconds> times;
+  order.take_before(1000, [&](const evidence::RecordPtr& record) {
+    times.push_back(evidence::time_of(*record));
+  });
+  EXPECT_EQ(times, (std::vector<evidence::Nanoseconds>{200, 250, 300, 350}));
+}
+
+// An operator has deactivated the source before its port was opened again.
+TEST(TimeOrder, WhatAPublisherFindsStandsAtItsTime) {
+  recorder::TimeOrder order;
+  std::vector<std::string> sources;
+  const auto add = [&](auto record, const char* source) {
+    auto context = std::make_shared<evidence::SourceContext>();
+    context->source = source;
+    record.context = std::move(context);
+    order.add(std::make_shared<const evidence::Record>(std::move(record)), 1000);
+  };
+  evidence::SourceState state;
+  state.why = evidence::SourceState::Why::joined;
+  state.word = shm::deactivation(300);
+  add(state, "/again");
+  evidence::Arrival arrival;
+  arrival.time = 200;
+  add(arrival, "/other");
+  order.take_before(1000, [&](const evidence::RecordPtr& record) {
+    sources.push_back(evidence::context_of(*record)->source);
+  });
+  EXPECT_EQ(sources, (std::vector<std::string>{"/other", "/again"}));
+}
+
 // Names may come and go for as long as it is recorded.
 TEST(TimeOrder, ForgetsSourcesThatTellNoMore) {
   recorder::TimeOrder order;
