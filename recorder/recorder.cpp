@@ -92,6 +92,7 @@ void Recorder::forget_taps() {
 
 Recorded Recorder::finish() {
   watcher_.stop();
+  watcher_.look_at_model();  // where this process was stopped until now
   watcher_.look_at_pages();
   last_push_ = 0;  // nothing new is news: that it has been recorded until now
   poll_taps();     // those too that it has opened since

@@ -338,6 +338,14 @@ void Watcher::find_ids() {
   pages_of_ids_ = pages;
 }
 
+void Watcher::look_at_model() {
+  if (memory_ == nullptr || !instance_->has_daemon()) return;
+  try {
+    if (memory_->tables().generation() != generation_) take_up_model();
+  } catch (const std::exception&) {  // it does not answer, or refuses
+  }
+}
+
 // What nobody tells: an operator deactivates a source whose port is closed; a publisher dies
 // between its arrival and telling of it. Where somebody tells, it may be that the tap was not
 // polled since; so the page is believed once a whole poll has told nothing. It was so when it was

@@ -49,7 +49,9 @@ class Watcher {
   // Goes on by itself.
   void start();
   void stop();
-  // Once it is stopped: for what has happened last. It does so by itself before.
+  // Once it is stopped: for what has happened last. It does so by itself before. The first asks the
+  // daemon, if another model has come into force.
+  void look_at_model();
   void look_at_pages();
 
   // The thread that polls.

@@ -46,6 +46,19 @@ TEST(Record, GoesOnAfterAHangupThatIsIgnored) {
   EXPECT_EQ(recording.end(), 0) << recording.error();
 }
 
+// It cannot have looked since.
+TEST(Record, HasTheModelThatCameIntoForceWhileItWasStopped) {
+  Daemon daemon(kOverrideModel);
+  Recording recording(daemon);
+  recording.process().signal(SIGSTOP);
+  daemon.load(std::string(kOverrideModel) + "<!-- another -->");
+  recording.process().signal(SIGINT);
+  EXPECT_EQ(recording.end(SIGCONT), 0) << recording.error();
+  const auto models = recording.records<evidence::ModelChange>();
+  ASSERT_EQ(models.size(), 2U);
+  EXPECT_EQ(models[1].generation, daemon.status()["model"]["generation"]);
+}
+
 TEST(Record, IsReadUpToTheLastChunkAfterAKill) {
   Daemon daemon(kOverrideModel);
   Node node("test");
