@@ -52,7 +52,7 @@ void WinnerTrack::set_rules(std::shared_ptr<const RuleTable> rules, std::uint64_
 void WinnerTrack::apply(const std::string& source, ActivityWord word, Nanoseconds time,
                         WinnerChange::Why why) {
   advance(time);
-  if (is_before_reading(source, word, time)) return;
+  if (is_before_reading(source, word, time, why == WinnerChange::Why::state)) return;
   if (shm::is_active(word, now_)) {
     words_[source] = word;
   } else {
@@ -84,7 +84,7 @@ void WinnerTrack::join(const std::string& source, ActivityWord word) {
   const bool has_unknown_time = shm::is_finite(word) && timeout == shm::kForever;
   const Nanoseconds time = has_unknown_time ? now_ : shm::time_of(word, timeout);
   const bool is_told = !shm::is_deactivation(word) && time > now_;
-  if (!is_told && !is_before_reading(source, word, time)) read(source, word);
+  if (!is_told && !is_before_reading(source, word, time, true)) read(source, word);
 }
 
 Nanoseconds WinnerTrack::timeout(const std::string& source) const {
@@ -100,18 +100,23 @@ void WinnerTrack::note_reading(const std::string& source, ActivityWord word) {
   kept_readings_ = std::max(readings_.size(), kFewReadings);
 }
 
-// Told late. Of an activity whose T is not known it is not known when it began.
-bool WinnerTrack::is_before_reading(const std::string& source, ActivityWord word,
-                                    Nanoseconds time) {
-  const auto reading = readings_.find(source);
-  if (reading == readings_.end()) return false;
-  const ActivityWord read = reading->second.word;
-  const Nanoseconds timeout = shm::is_finite(read) ? this->timeout(source) : shm::kForever;
-  const bool has_unknown_time = shm::is_finite(read) && timeout == shm::kForever;
-  if (shm::is_deactivation(word)) time = std::max(time, shm::time_of(word, timeout));
-  if (!has_unknown_time && time < shm::time_of(read, timeout)) return true;
-  readings_.erase(reading);
-  return false;
+// Told late. A state tells of its last arrival, of which nobody may have told. What was read was so
+// when it was read, whatever T is by now. Of an activity whose T is not known it is not known when
+// it began.
+bool WinnerTrack::is_before_reading(const std::string& source, ActivityWord word, Nanoseconds time,
+                                    bool is_state) {
+  const auto found = readings_.find(source);
+  if (found == readings_.end()) return false;
+  const Reading& reading = found->second;
+  const Nanoseconds timeout = this->timeout(source);
+  const auto is_dated = [&](ActivityWord each) {
+    return !shm::is_finite(each) || timeout != shm::kForever;
+  };
+  if (is_state && is_dated(word)) time = std::max(time, shm::time_of(word, timeout));
+  const bool is_before =
+      is_dated(reading.word) && time < std::min(shm::time_of(reading.word, timeout), reading.at);
+  if (!is_before) readings_.erase(found);
+  return is_before;
 }
 
 // At the moment of its end an activity is over.

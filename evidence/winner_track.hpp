@@ -55,7 +55,7 @@ class WinnerTrack {
   void note_end(const std::string& source, ActivityWord word);
   void note_reading(const std::string& source, ActivityWord word);
   [[nodiscard]] bool is_before_reading(const std::string& source, ActivityWord word,
-                                       Nanoseconds time);
+                                       Nanoseconds time, bool is_state);
   [[nodiscard]] Nanoseconds timeout(const std::string& source) const;
   [[nodiscard]] const std::string& name_of_source(shm::SourceId source) const;
 

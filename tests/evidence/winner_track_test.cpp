@@ -159,5 +159,27 @@ TEST_F(TrackedWinners, WhatWasBeforeAPageWasReadChangesNothing) {
   EXPECT_EQ(told(), (Lines{"1150 /high state /high", "1200 /low deactivation /high"}));
 }
 
+// A state bears the time of what was told last, perhaps long before the arrival that it tells of.
+TEST_F(TrackedWinners, AStateBehindAReadingTellsOfItsOwnArrival) {
+  track_.advance(2000);
+  track_.read("/high", 100 + 500);
+  track_.advance(3010);
+  track_.apply("/high", 3000 + 500, 0, Why::state);
+  track_.advance(4000);
+  EXPECT_EQ(told(), (Lines{"3010 /high state /high", "3500 - expiry /high"}));
+}
+
+// What was read was so when it was read, whatever T is by now.
+TEST_F(TrackedWinners, AReadingUnderALongerTimeoutIsNoLaterThanItself) {
+  track_.advance(2000);
+  track_.read("/high", 1000 + 10'000);
+  track_.advance(2100);
+  track_.apply("/high", shm::deactivation(4000), 4000, Why::deactivation);
+  arrive("/high", 5000);
+  track_.advance(6000);
+  EXPECT_EQ(told(), (Lines{"2000 /high state /high", "4000 - deactivation /high",
+                           "5000 /high arrival /high", "5500 - expiry /high"}));
+}
+
 }  // namespace
 }  // namespace arbiter::test
