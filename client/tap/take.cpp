@@ -131,11 +131,14 @@ bool TapCore::look_at(Stream& stream) noexcept {
   if (stream.has_head) return true;
   if (stream.ended) return false;
   const bool gone = stream.gone;  // before the look: what it has told comes before its end
-  for (int passed = 0; stream.reader.join(); ++passed) {
+  // What it told before is no more than its ring holds: whoever goes on writing is not heard.
+  const auto may_have_more = [&] { return stream.behind_end <= stream.source->shape.events; };
+  for (int passed = 0; may_have_more() && stream.reader.join(); ++passed) {
     if (passed == kMaxPassedOver) return false;
     std::uint64_t lost = 0;
     const Found found = stream.reader.read(stream.head, lost);
     if (found == Found::kNothing) break;
+    if (gone) ++stream.behind_end;
     stream.head_lost = lost;
     if (!is_honest(stream)) {
       give_up(stream, found == Found::kGap ? lost : lost + 1);

@@ -149,8 +149,9 @@ class TapCore {
   struct Stream {
     std::shared_ptr<const TapSource> source;
     bool gone = false;
-    bool ended = false;      // all has been told, its end too
-    bool has_begun = false;  // something of it has been taken
+    bool ended = false;            // all has been told, its end too
+    bool has_begun = false;        // something of it has been taken
+    std::uint32_t behind_end = 0;  // read since it has gone
     std::optional<shm::ActivityWord> end;
     shm::EventReader reader;
     bool has_head = false;

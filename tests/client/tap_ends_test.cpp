@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <future>
 #include <map>
 #include <optional>
 #include <string>
@@ -19,6 +20,7 @@
 #include "tests/support/await.hpp"
 #include "tests/support/daemon.hpp"
 #include "tests/support/error_of.hpp"
+#include "tests/support/raw_publisher.hpp"
 
 namespace arbiter::test {
 namespace {
@@ -38,6 +40,25 @@ TEST(Tap, FollowsASourceThatClosesAndComesAgain) {
     EXPECT_EQ(wait_for_kind(tap, TapEventKind::closed).sequence(), 2u);
   }
   EXPECT_EQ(tap.lost(), 0u);
+}
+
+// Whoever had the name before can still write to what it told taps by.
+TEST(Tap, HearsOfASuccessorThoughThePortBeforeGoesOnTelling) {
+  Daemon daemon(single_model());
+  Node watcher("watcher");
+  RawPublisher before(daemon.instance(), "/out");
+  auto opening = std::async(std::launch::async, [&] { return watcher.tap("/out"); });
+  before.admit();
+  auto tap = opening.get();
+  before.close();
+  Node node("test");
+  auto out = node.output_port<Number>("/out");
+  out.publish(Number{1});
+  for (bool is_heard = false; !is_heard;) {
+    before.signal_at(shm::monotonic_now());
+    const auto event = tap.take();
+    is_heard = event && event->kind() == TapEventKind::sample;
+  }
 }
 
 // Of what happened while it did not look.

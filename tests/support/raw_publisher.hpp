@@ -26,6 +26,7 @@ class RawPublisher {
     const wire::Received opened = open_raw_output(client_, name, output_);
     page_ = shm::Mapping(opened.descriptors[0], sizeof(shm::ActivityPage), shm::Access::kReadWrite);
     source_ = opened.message.id;
+    port_ = opened.message.port;
   }
 
   // Takes the next tap in, once it comes.
@@ -53,6 +54,8 @@ class RawPublisher {
     record.masks.accepted = 1;
     write(record);
   }
+  // It can go on telling.
+  void close() { close_raw(client_, port_); }
   void write(const shm::EventRecord& record) { writer_->write(record); }
 
   [[nodiscard]] shm::EventSegment& events() const { return *events_; }
@@ -67,6 +70,7 @@ class RawPublisher {
   std::optional<shm::EventWriter> writer_;
   shm::Mapping page_;
   shm::SourceId source_ = 0;
+  shm::PortInstance port_ = 0;
   std::uint32_t taps_ = 0;
 };
 
