@@ -269,6 +269,8 @@ void Bridge::look_after(shm::Nanoseconds now, bool all) {
       options_.on_turned_away();
     }
     tell_at_ = shm::monotonic_now() + kTellPeriod;
+    // To ask whether it is turned away may have taken up the news of another model.
+    if (max_ages_.is_outdated()) bell_.ring();
   }
   // From here on: who was held up above serves before the next round.
   tend_at_ = shm::monotonic_now() + (is_any(false) ? kLookPeriod : middleware_.tend_period());
@@ -295,8 +297,7 @@ bool Bridge::hear(int milliseconds, bool& all) {
       bell_.silence();
       all = true;
     } else if (whose == &max_ages_) {
-      all = all || max_ages_.is_outdated();
-      max_ages_.update();
+      all = max_ages_.update() || all;
     } else {
       static_cast<Part*>(whose)->outgoing->run(now);
     }

@@ -45,7 +45,7 @@ void MaxAges::add(const Entry& entry, MaxAge& age) {
   update();
 }
 
-void MaxAges::update() {
+bool MaxAges::update() {
   if (instance_ == nullptr) {
     join();
   } else {
@@ -57,7 +57,9 @@ void MaxAges::update() {
     }
   }
   // Before they are read: what comes in between is found the next time.
+  const shm::Epoch before = epoch_;
   if (instance_ != nullptr) epoch_ = instance_->memory()->tables().epoch();
+  bool has_changed = epoch_ != before;
   for (const Watched& each : watched_) {
     const auto ports = each.entry->ports();
     MaxAge::OfPorts ages{};
@@ -67,8 +69,12 @@ void MaxAges::update() {
       ages[i] = max_age_of(timeouts.own, timeouts.of_model, each.entry->max_age);
       is_forever = is_forever && timeouts.own == shm::kForever;
     }
-    each.age->set(ages, is_forever, instance_ != nullptr);
+    const bool is_known = instance_ != nullptr;
+    has_changed =
+        has_changed || each.age->is_forever() != is_forever || each.age->is_known() != is_known;
+    each.age->set(ages, is_forever, is_known);
   }
+  return has_changed;
 }
 
 bool MaxAges::is_outdated() const {

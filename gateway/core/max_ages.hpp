@@ -32,10 +32,9 @@ class MaxAges final : public AgesOfSources {
   // `age` belongs to the caller and is written by update(), also by this call.
   void add(const Entry& entry, MaxAge& age);
   // Reads memory, and the daemon's news; does not wait. Call it where there is news, and twice a
-  // second.
-  void update();
-  // Whether another model may be in force than at the last update(): one load. Ask it before that
-  // takes up what the daemon says of it.
+  // second. True: another model may be in force than before, or what is known of T has changed.
+  bool update();
+  // Whether another model may be in force than at the last update(): one load.
   [[nodiscard]] bool is_outdated() const;
   // Readable when the daemon has said something; negative: it has not let us in yet.
   [[nodiscard]] int descriptor() const noexcept {

@@ -34,7 +34,8 @@ std::unique_ptr<Domain> join_domain(const Gateway& gateway, const std::set<std::
     // A configuration may ask for IPv6, of which no address is looked up.
     const bool may_be_ipv4 = gateway.configuration.empty();
     auto domain = std::make_unique<Domain>(may_be_ipv4 ? known : gateway, topics, bell);
-    peer_names.note_unknown(words.unknown_peers());
+    // Else it would be joined again each minute for an address that it cannot use.
+    if (may_be_ipv4) peer_names.note_unknown(words.unknown_peers());
     words.tell();
     return domain;
   } catch (const DdsError&) {
@@ -206,7 +207,8 @@ void DdsMiddleware::tend() {
 
 // To join again is silence for all of the domain's topics: not where everybody has been found.
 void DdsMiddleware::leave_for_new_peers(Site& site) {
-  if (!site.domain) return;
+  // Cyclone lets it wait while it joins another.
+  if (!site.domain || is_joining()) return;
   const std::string change = site.peer_names->change();
   if (change.empty()) return;
   const bool is_anybody_missing = std::any_of(site.ends.begin(), site.ends.end(),

@@ -88,6 +88,7 @@ class MappingReader {
       gateway.interfaces = attributes.list("interface", 255);
       refuse_twice(attributes, gateway.interfaces);
       gateway.peers = attributes.list("peers", 255);
+      refuse_blanks(attributes, gateway.peers);
       if (const auto file = attributes.text("configuration", 4096)) {
         gateway.configuration = path_of(*file);
         gateway.configuration_text = read_configuration(attributes, gateway.configuration);
@@ -166,6 +167,15 @@ class MappingReader {
     if (twice == interfaces.end()) return;
     attributes.error("invalid-value", "interface",
                      rules::quote(*twice) + " is named twice, which Cyclone refuses; name it once");
+  }
+
+  static void refuse_blanks(Attributes& attributes, const std::vector<std::string>& peers) {
+    for (const std::string& peer : peers) {
+      if (peer.find_first_of(" \t\n;/") == std::string::npos) continue;
+      attributes.error("invalid-value", "peers",
+                       rules::quote(peer) +
+                           " is no address and no name; write several with commas between them");
+    }
   }
 
   // Its elements are Cyclone's business, which says what it does not like when a domain is joined.

@@ -41,8 +41,10 @@ class Observers {
       Client& client = *clients.find(last_told_);
       Observer& observer = next->second;
       if (!client.has_queue()) {
-        is_more = switchboard.show_news(client, observer.told, left) || is_more;
-        tell_model(client, observer, generation);
+        const bool has_more = switchboard.show_news(client, observer.told, left);
+        is_more = has_more || is_more;
+        // Behind the names that it speaks of. Who has a queue is told once that is sent.
+        if (!has_more && !client.has_queue()) tell_model(client, observer, generation);
       }
       while (!observer.waiting.empty() && observer.waiting.front().news <= observer.told) {
         client.send(reply_to(observer.waiting.front().request, wire::MessageKind::kDone));

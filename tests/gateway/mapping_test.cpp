@@ -244,6 +244,8 @@ TEST(Mapping, NamesAreOnesThatCycloneTakes) {
   EXPECT_THAT(of_ros("/2nd"), HasSubstr("not a digit first"));
   EXPECT_THAT(read_text("<gateway kind='dds' interface='lo,eth0, lo'/>").message(),
               HasSubstr("\"lo\" is named twice"));
+  EXPECT_THAT(read_text("<gateway kind='dds' peers='10.0.0.1, 10.0.0.2 10.0.0.3'/>").message(),
+              HasSubstr("\"10.0.0.2 10.0.0.3\" is no address and no name"));
 }
 
 // Before the robot moves, and not when the gateway starts.
