@@ -22,6 +22,11 @@
 namespace arbiter::cli {
 namespace {
 
+// Of a dry run: whether that is what would come into force, and not only be read again.
+bool would_replace(const wire::ChangeReport& report, const wire::ModelComparison& model) {
+  return model.in_force || report.back_to.has_value();
+}
+
 void write_past(const std::string& what, const wire::PastModelStatus& past) {
   std::cout << what << past.name;
   for (const auto& file : past.files) std::cout << ' ' << file;
@@ -78,7 +83,7 @@ std::optional<std::vector<std::string>> unmentioned(const std::string& verb,
   }
   std::set<std::string> dropped;
   for (const auto& model : report.models.value_or(std::vector<wire::ModelComparison>())) {
-    if (!model.in_force || !model.changes || !model.changes->diff) continue;
+    if (!would_replace(report, model) || !model.changes || !model.changes->diff) continue;
     for (const wire::PortDifference& each : model.changes->diff->ports) {
       if (!each.after.exists) dropped.insert(each.port);
     }
@@ -145,7 +150,7 @@ void name_files_from_here(wire::ChangeReport& report, const nlohmann::json& docu
 void write_dropped(const std::string& verb, const std::string& instance,
                    const wire::ChangeReport& report) {
   for (const auto& model : report.models.value_or(std::vector<wire::ModelComparison>())) {
-    if (!model.in_force) continue;
+    if (!would_replace(report, model)) continue;
     write_open("open now, and no longer mentioned by model " +
                    rules::quote(shm::printable(model.name)) + ", so that no sample would arrive",
                unmentioned(verb, instance, report, true));
@@ -224,8 +229,9 @@ int preview_change(const std::string& verb, const std::string& instance,
     std::cout << "the policy " << report.policy->file << " differs from the one in force: it has "
               << rules::counted(report.policy->rules, "rule") << '\n';
   }
-  std::cout << "this was a dry run: arbiter " << verb << " puts "
-            << (goes_back ? "that model" : "the files") << " in force\n";
+  std::cout << "this was a dry run: arbiter " << verb
+            << (goes_back ? ' ' + std::to_string(report.back_to->generation) : std::string())
+            << " puts " << (goes_back ? "that model" : "the files") << " in force\n";
   return 0;
 }
 

@@ -166,7 +166,6 @@ bool Daemon::hand_back(Client& client, wire::Received& received) {
 bool Daemon::change_model(Client& client, const wire::Message& message) {
   switch (message.kind) {
     case wire::MessageKind::kReload:
-      gate_.require(client, Action::kReload);
       ask_for_reload(client, message);
       return true;
     case wire::MessageKind::kSwitch:
@@ -187,7 +186,12 @@ void Daemon::ask_for_reload(Client& client, const wire::Message& message) {
   if ((message.flags & wire::kDryRun) != 0) {
     change.kind = Change::Kind::kCompare;
     change.of_past = (message.flags & wire::kGoesBack) != 0;
-    if (change.of_past) change.generation = message.link;
+  }
+  if (change.of_past) {
+    gate_.require_rollback(client);
+    change.generation = message.link;
+  } else {
+    gate_.require(client, Action::kReload);
   }
   changes_.ask(std::move(change), client, message);
 }

@@ -273,7 +273,7 @@ void ModelChanges::finish_comparison(const Swap& swap, const Reading& reading) {
   for (std::size_t i = 0; i < reading.models.size(); ++i) {
     const std::string& name = reading.models[i]->name;
     models.push_back({{"name", name},
-                      {"in_force", swap.change.of_past || name == board_.name()},
+                      {"in_force", !swap.change.of_past && name == board_.name()},
                       {"changes", nlohmann::json::parse(reading.diffs[i])}});
   }
   answer(swap, {{"ok", true},

@@ -299,7 +299,9 @@ void ModelChanges::answer_without_report(const Swap& swap, Client& client, std::
                                          const std::string& why_not, const std::string& lacks) {
   if (!why_not.empty()) return refuse(client, request, why_not + lacks);
   if (swap.change.kind == Change::Kind::kCompare && !lacks.empty()) {
-    return refuse(client, request, "the files were compared" + lacks);
+    return refuse(
+        client, request,
+        (swap.change.of_past ? "the models were compared" : "the files were compared") + lacks);
   }
   auto reply = reply_to(request, wire::MessageKind::kDone);
   reply.value = static_cast<std::uint32_t>(board_.in_force().generation);

@@ -19,7 +19,7 @@ TEST_F(ChangingModels, ADryRunOfARollbackSaysWhereToAndWhatChanges) {
                                               "/model.xml (reload)\n"));
   EXPECT_THAT(result.out, testing::HasSubstr("/in"));
   EXPECT_THAT(result.out,
-              testing::EndsWith("\nthis was a dry run: arbiter rollback puts that model in "
+              testing::EndsWith("\nthis was a dry run: arbiter rollback 2 puts that model in "
                                 "force\n"));
   const auto dry = nlohmann::json::parse(arbiter({"rollback", "1", "--dry-run", "--json"}).out);
   expect_refusal(arbiter({"rollback", "9", "--dry-run"}),
@@ -29,6 +29,7 @@ TEST_F(ChangingModels, ADryRunOfARollbackSaysWhereToAndWhatChanges) {
   const auto done = nlohmann::json::parse(arbiter({"rollback", "1", "--json"}).out);
   EXPECT_EQ(dry["back_to"], done["back_to"]);
   EXPECT_EQ(dry["models"][0]["changes"], done["changes"]);
+  EXPECT_EQ(dry["models"][0]["in_force"], false);
 }
 
 }  // namespace
