@@ -299,8 +299,8 @@ class PortFindings {
                       "at " + port_.port + ", " + by + " silences " + others + " even while " +
                           (lacks_z ? by + " cannot win for want of " + z : z + " silences " + by) +
                           ": with " + in_words(*shortest) + ", nobody wins; if " + would_win +
-                          " should win then, replace the inhibition by a further condition of its "
-                          "behaviour" +
+                          " should win then, replace what keeps it out, an inhibition or a part of "
+                          "its condition, by a condition of its behaviour" +
                           condition,
                       {.ports = {port_.port}, .source = by}, *shortest);
     return true;

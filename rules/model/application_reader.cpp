@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -60,9 +61,33 @@ class ApplicationReader {
     for (const XmlNode& element : Elements(root.first_child)) {
       if (element.text == "connection") fine = read_connection(element) && fine;
       if (element.text == "module") read_module(element);
-      warn_if_misspelt(element, {"connection", "module", "arbitration"});
+      if (!warn_if_outside(element)) {
+        warn_if_misspelt(element, {"connection", "module", "arbitration"});
+      }
     }
     return fine;
+  }
+
+  // All that a model has stands in <arbitration>.
+  bool warn_if_outside(const XmlNode& element) {
+    static const std::set<std::string_view> kOfModel{"behaviors", "behaviours",    "behavior",
+                                                     "behaviour", "meta_behavior", "meta_behaviour",
+                                                     "arbiter",   "source",        "define"};
+    const auto is_at = [](const XmlAttribute& each) { return each.name == "at"; };
+    const bool is_yarps =  // its arbiters name their port in an element
+        element.text == "arbiter" &&
+        std::none_of(element.attributes.begin(), element.attributes.end(), is_at);
+    if (!kOfModel.contains(element.text) || is_yarps) return false;
+    const std::string tag = '<' + std::string(element.text) + '>';
+    diagnostics_.warning(
+        "misspelt-element", locate(file_, element),
+        tag +
+            " stands outside <arbitration>, and is passed over with all that "
+            "it holds; put " +
+            (element.text.starts_with("behavio") && element.text.back() == 's' ? "what it holds"
+                                                                               : "it") +
+            " into <arbitration>");
+    return true;
   }
 
   // YARP has elements that are not ours; nearly one of ours is most likely that one, and all that

@@ -28,7 +28,7 @@ std::string ConflictAdvice::inhibition(const std::vector<std::size_t>& one,
 }
 
 // One inhibitor that has the one's source is enough, if none of the behaviours that configure the
-// other is left out.
+// other is left out, and the one keeps all of its own.
 std::string ConflictAdvice::inhibition_of_all(const std::vector<std::size_t>& inhibitors,
                                               const std::vector<std::size_t>& inhibited) {
   for (const std::size_t inhibitor : inhibitors) {
@@ -36,7 +36,8 @@ std::string ConflictAdvice::inhibition_of_all(const std::vector<std::size_t>& in
     std::vector<std::string> names;
     for (const std::size_t each : inhibited) {
       const auto siblings = siblings_above(inhibitor, each);
-      if (!siblings || (!name.empty() && siblings->first != name)) {
+      if (!siblings || (!name.empty() && siblings->first != name) ||
+          is_any_in(siblings->second, inhibitors)) {
         names.clear();
         break;
       }
@@ -51,6 +52,13 @@ std::string ConflictAdvice::inhibition_of_all(const std::vector<std::size_t>& in
     return "let " + quote(name) + " inhibit " + enumerate(names);
   }
   return {};
+}
+
+bool ConflictAdvice::is_any_in(std::string_view parent, const std::vector<std::size_t>& of) {
+  return std::any_of(of.begin(), of.end(), [&](std::size_t behaviour) {
+    const auto way = way_to(rules_.behaviours[behaviour].name);
+    return std::find(way.begin(), way.end(), parent) != way.end();
+  });
 }
 
 std::optional<ConflictAdvice::Siblings> ConflictAdvice::siblings_above(std::size_t one,

@@ -29,6 +29,8 @@ class ConflictAdvice {
 
   [[nodiscard]] std::string inhibition_of_all(const std::vector<std::size_t>& inhibitors,
                                               const std::vector<std::size_t>& inhibited);
+  // Whether one of these is that behaviour, or stands in it.
+  [[nodiscard]] bool is_any_in(std::string_view parent, const std::vector<std::size_t>& of);
   // Those of one parent that are, or contain, the one and the other; nothing: one contains the
   // other, or they are the same.
   [[nodiscard]] std::optional<Siblings> siblings_above(std::size_t one, std::size_t other);

@@ -55,6 +55,18 @@ TEST(Application, WarnsOfAMisspeltElement) {
                                            "<modules> and its end, and leave what it holds"));
 }
 
+// It has no effect there.
+TEST(Application, WarnsOfWhatBelongsIntoTheArbitration) {
+  const Loaded loaded = load_with_application(
+      kModel, "<application>" + connection("/s", "/p") +
+                  "\n<source port='/s' timeout='10s'/>"
+                  "\n<behaviors><behavior name='B'/></behaviors>\n</application>");
+  EXPECT_THAT(loaded.findings(),
+              ElementsAre("2:1 warning misspelt-element", "3:1 warning misspelt-element"));
+  EXPECT_THAT(loaded.message(), HasSubstr("; put it into <arbitration>"));
+  EXPECT_THAT(loaded.message(1), HasSubstr("; put what it holds into <arbitration>"));
+}
+
 // YARP's own, what a module has beside its own, and short words that differ in a letter.
 TEST(Application, PassesOverWhatIsNoMisspeltElement) {
   const Loaded loaded = load_with_application(

@@ -103,11 +103,12 @@ TEST(Findings, NameWhoSilencesOthersWhileItsConditionFails) {
   const auto found = found_in(
       RulesByHand().port("/p", {{"/low", inactive("/high")}, {"/high", active("/enable")}}));
   ASSERT_THAT(found.codes(), ElementsAre("nobody-wins", "starved"));
-  EXPECT_EQ(found.items[1].message,
-            "at /p, /high silences /low even while /high cannot win for want of /enable: with "
-            "/high and /low active and /enable inactive, nobody wins; if /low should win then, "
-            "replace the inhibition by a further condition of its behaviour: \"not /high or not "
-            "/enable\"");
+  EXPECT_EQ(
+      found.items[1].message,
+      "at /p, /high silences /low even while /high cannot win for want of /enable: with "
+      "/high and /low active and /enable inactive, nobody wins; if /low should win then, "
+      "replace what keeps it out, an inhibition or a part of its condition, by a condition of "
+      "its behaviour: \"not /high or not /enable\"");
   EXPECT_EQ(found.items[1].where.line, 3u);
 }
 
