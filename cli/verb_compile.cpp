@@ -65,13 +65,11 @@ void check_by_reading_back(const std::string& content, const rules::RuleSet& rul
   }
 }
 
-// It can be made again, unlike an application that somebody has written.
-bool is_written_by_compile(const std::string& path) {
+bool holds_already(const std::string& path, const std::string& content) {
   std::error_code unknown;
   if (!std::filesystem::is_regular_file(path, unknown)) return false;
   std::ifstream file(path, std::ios::binary);
-  const std::string content(std::istreambuf_iterator<char>(file), {});
-  return content.find(rules::kWrittenByCompile) != std::string::npos;
+  return std::string(std::istreambuf_iterator<char>(file), {}) == content;
 }
 
 int compile(const CompileOptions& options) {
@@ -82,7 +80,8 @@ int compile(const CompileOptions& options) {
   require_no_input(options.output, *model->rules.texts);
   const std::string content = merge(model->rules);
   check_by_reading_back(content, model->rules);
-  if (!is_written_by_compile(options.output)) require_new_file(options.output, options.replaces);
+  if (holds_already(options.output, content)) return 0;
+  require_new_file(options.output, options.replaces);
   write_output(options.output, content);
   return 0;
 }
@@ -102,7 +101,7 @@ void add_compile(CLI::App& app, int& exit_code) {
       "holds\nthe rules of each input port. You can use it as an application, and as a model that "
       "decides in\nthe same way. Without --application, the result is a new application with the "
       "connections that\nthe model configures. A file that is there already is replaced only with "
-      "--force, or if\n`arbiter compile` has written it.\n\n"
+      "--force:\nsomebody may have changed it.\n\n"
       "Examples:\n"
       "  arbiter compile search_and_track.xml --application application.xml -o merged.xml\n"
       "  arbiter check merged.xml\n"

@@ -69,7 +69,7 @@ class ArbitrationWriter {
   // From <arbitration to its closing tag, to be put where an element may begin.
   std::string write() {
     text_ += "<arbitration timeout=\"" + to_string(rules_.timeout) + "\">";
-    line(2, "<!-- " + std::string(kWrittenByCompile) + ": the rules of each input port. -->");
+    line(2, "<!-- Written by arbiter compile: the rules of each input port. -->");
     if (needs_define()) line(2, "<define name=\"" + std::string(kDollar) + "\">$</define>");
     write_sources();
     for (const PortRules& port : rules_.ports) write_port(port);

@@ -23,9 +23,6 @@
 
 namespace arbiter::rules {
 
-// In a comment at the head of the <arbitration>.
-inline constexpr std::string_view kWrittenByCompile = "Written by arbiter compile";
-
 // `application` is a well-formed file with that root. It stays as it is, byte by byte, but for an
 // <arbitration> that it may have had.
 std::string merge_rules(const RuleSet& rules, std::string_view application);

@@ -200,7 +200,7 @@ TEST(Compile, ReplacesAFileAsAWholeAndKeepsLinksAndModes) {
   EXPECT_THAT(refused.err, HasSubstr("/link.xml is there already; nothing was written: give"));
   EXPECT_EQ(content_of(target), "old");
   EXPECT_EQ(arbiter({"compile", model, "-o", link, "--force"}).exit_code, 0);
-  EXPECT_EQ(arbiter({"compile", model, "-o", link}).exit_code, 0) << "it wrote that itself";
+  EXPECT_EQ(arbiter({"compile", model, "-o", link}).exit_code, 0) << "that is there already";
   EXPECT_TRUE(fs::is_symlink(link));
   EXPECT_THAT(content_of(target), HasSubstr("<arbitration"));
   EXPECT_EQ(fs::status(target).permissions(), fs::perms::owner_read | fs::perms::owner_write);
