@@ -70,14 +70,14 @@ class ApplicationReader {
 
   // All that a model has stands in <arbitration>.
   bool warn_if_outside(const XmlNode& element) {
-    static const std::set<std::string_view> kOfModel{"behaviors", "behaviours",    "behavior",
+    static const std::set<std::string_view> of_model{"behaviors", "behaviours",    "behavior",
                                                      "behaviour", "meta_behavior", "meta_behaviour",
                                                      "arbiter",   "source",        "define"};
     const auto is_at = [](const XmlAttribute& each) { return each.name == "at"; };
     const bool is_yarps =  // its arbiters name their port in an element
         element.text == "arbiter" &&
         std::none_of(element.attributes.begin(), element.attributes.end(), is_at);
-    if (!kOfModel.contains(element.text) || is_yarps) return false;
+    if (!of_model.contains(element.text) || is_yarps) return false;
     const std::string tag = '<' + std::string(element.text) + '>';
     diagnostics_.warning(
         "misspelt-element", locate(file_, element),

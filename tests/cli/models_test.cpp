@@ -96,7 +96,7 @@ TEST(Models, DecideAlikeWhenTheyAreMergedIntoTheirApplications) {
   const std::string merged = directory.path() + "/merged.xml";
   for (const auto& folder : model_folders()) {
     SCOPED_TRACE(folder.path);
-    const auto compiled = run_verb("compile", folder.model(), {"-o", merged});
+    const auto compiled = run_verb("compile", folder.model(), {"-o", merged, "--force"});
     ASSERT_EQ(compiled.exit_code, 0) << compiled.err;
     const std::vector<std::string> trace{"--trace", folder.file("trace.csv")};
     const std::string outcome = content_of(folder.file("outcome.csv"));

@@ -72,8 +72,9 @@ TEST(Findings, NameAShortestStateWithoutAWinnerAndItsPlace) {
   EXPECT_THAT(others[1].active, ElementsAre("/low", "/off"));
   EXPECT_EQ(found.items[1].message,
             "at /p, /high silences /low even while /stop silences /high: with /high, /low and "
-            "/stop active and /off inactive, nobody wins; if /low should win then, replace the "
-            "inhibition by a further condition of its behaviour: \"not /high or /stop\"");
+            "/stop active and /off inactive, nobody wins; if /low should win then, replace "
+            "what keeps it out, an inhibition or a part of its condition, by a condition of its "
+            "behaviour: \"not /high or /stop\"");
   EXPECT_EQ(found.items[1].where.line, 3u);
 }
 

@@ -235,6 +235,10 @@ void Honest::hear(const wire::Received& received) {
     case MessageKind::kUnmentioned:
       require(message.port == port_, "the port that is not mentioned is the client's own");
       break;
+    case MessageKind::kModelInForce:
+      require(message.link > model_, "each model that the daemon tells of is a later one");
+      model_ = message.link;
+      break;
     case MessageKind::kPortName:
     case MessageKind::kModelReply:
       break;

@@ -90,6 +90,7 @@ class Honest {
   std::map<shm::SourceId, std::string> pages_;
   std::map<shm::PortInstance, std::uint32_t> peers_;
   std::uint64_t done_ = 0;
+  std::uint64_t model_ = 0;  // the generation that it was told of last
   std::string refusal_;
   std::string status_;
 };
