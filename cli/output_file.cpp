@@ -8,6 +8,8 @@
 #include <filesystem>
 #include <fstream>
 #include <iostream>
+#include <string>
+#include <system_error>
 
 #include "cli/broken_pipe.hpp"
 #include "rules/model/load.hpp"
@@ -107,6 +109,18 @@ void require_named_file(const std::string& output, const std::string& why) {
 
 void add_force_option(CLI::App& verb, bool& replaces) {
   verb.add_flag("--force", replaces, "Replace files that are there already");
+}
+
+// However large it is, no more of it is read than is compared.
+bool holds_already(const std::string& path, const std::string& content) {
+  std::error_code unknown;
+  if (is_standard_output(path) || !std::filesystem::is_regular_file(path, unknown) ||
+      std::filesystem::file_size(path, unknown) != content.size()) {
+    return false;
+  }
+  std::ifstream file(path, std::ios::binary);
+  std::string there(content.size(), '\0');
+  return file.read(there.data(), static_cast<std::streamsize>(there.size())) && there == content;
 }
 
 void require_new_file(const std::string& output, bool replaces) {

@@ -25,6 +25,9 @@ void require_named_file(const std::string& output, const std::string& why);
 // --force, for verbs whose files somebody may have changed by hand or may have no second time.
 void add_force_option(CLI::App& verb, bool& replaces);
 
+// Whether that file is there, and has this content. Standard output has none.
+[[nodiscard]] bool holds_already(const std::string& path, const std::string& content);
+
 // Throws rules::FileError where a file is there already, unless it may be replaced (--force).
 void require_new_file(const std::string& output, bool replaces);
 

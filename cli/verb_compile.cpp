@@ -1,12 +1,9 @@
 // arbiter compile: the application with the rules of its arbiters merged in.
 #include <filesystem>
-#include <fstream>
 #include <iostream>
-#include <iterator>
 #include <memory>
 #include <stdexcept>
 #include <string>
-#include <system_error>
 
 #include <CLI/CLI.hpp>
 
@@ -63,13 +60,6 @@ void check_by_reading_back(const std::string& content, const rules::RuleSet& rul
     throw std::logic_error(
         "the result reads back as different rules; this is a bug in arbiter: please report it");
   }
-}
-
-bool holds_already(const std::string& path, const std::string& content) {
-  std::error_code unknown;
-  if (!std::filesystem::is_regular_file(path, unknown)) return false;
-  std::ifstream file(path, std::ios::binary);
-  return std::string(std::istreambuf_iterator<char>(file), {}) == content;
 }
 
 int compile(const CompileOptions& options) {

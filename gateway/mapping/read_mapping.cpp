@@ -88,7 +88,7 @@ class MappingReader {
       gateway.interfaces = attributes.list("interface", 255);
       refuse_twice(attributes, gateway.interfaces);
       gateway.peers = attributes.list("peers", 255);
-      refuse_blanks(attributes, gateway.peers);
+      refuse_no_hosts(attributes, gateway.peers);
       if (const auto file = attributes.text("configuration", 4096)) {
         gateway.configuration = path_of(*file);
         gateway.configuration_text = read_configuration(attributes, gateway.configuration);
@@ -169,7 +169,7 @@ class MappingReader {
                      rules::quote(*twice) + " is named twice, which Cyclone refuses; name it once");
   }
 
-  static void refuse_blanks(Attributes& attributes, const std::vector<std::string>& peers) {
+  static void refuse_no_hosts(Attributes& attributes, const std::vector<std::string>& peers) {
     for (const std::string& peer : peers) {
       if (peer.find_first_of(" \t\n;/") == std::string::npos) continue;
       attributes.error("invalid-value", "peers",
