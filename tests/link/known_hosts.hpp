@@ -1,6 +1,7 @@
 // What links know of each other, asked for as programs do it.
 #pragma once
 
+#include <cstddef>
 #include <functional>
 #include <string>
 #include <tuple>
@@ -39,6 +40,15 @@ inline wire::HostsDocument await_host(const std::string& instance, const std::st
   });
 }
 
+// Until that instance can ask the other host, and knows how many input ports it has open. What one
+// host knows of another says nothing of what that one knows of it.
+inline void await_inputs(const std::string& instance, const std::string& other, std::size_t count) {
+  await_hosts(instance, [&](const wire::HostsDocument& hosts) {
+    const wire::HostStatus* const found = hosts.find_host(other);
+    return found != nullptr && found->is_up && found->inputs.size() == count;
+  });
+}
+
 // Equal to another: no host has been lost or found in between. On a busy machine a lease may end.
 using Presences = std::vector<std::tuple<std::string, shm::Nanoseconds, bool>>;
 
@@ -53,6 +63,17 @@ inline Presences presences_at(const std::string& host) {
 inline ProgramResult run_arbiter(const std::string& instance, std::vector<std::string> arguments) {
   arguments.insert(arguments.end(), {"--instance", instance});
   return arbiter(arguments);
+}
+
+// Until it succeeds: on a busy machine a host may not answer within its second.
+inline ProgramResult run_answered(const std::string& instance,
+                                  const std::vector<std::string>& arguments) {
+  ProgramResult result;
+  await([&] {
+    result = run_arbiter(instance, arguments);
+    return result.exit_code == 0;
+  });
+  return result;
 }
 
 }  // namespace arbiter::test

@@ -66,12 +66,10 @@ TEST_F(WhyOfHosts, WhyOfOneThatDoesNotHaveThePortOpenSaysSo) {
   Planner planner(head);
   Body body(base);
   body.drive(planner);
-  await_hosts("base", [](const wire::HostsDocument& hosts) {
-    const auto* const here = hosts.find_host("base");
-    return hosts.find_host("head") != nullptr && here != nullptr && here->inputs.size() == 1;
-  });
-  const ProgramResult of_head = run_arbiter("base", {"why", kMotor, "--host", "head"});
-  EXPECT_EQ(of_head.exit_code, 0) << of_head.err;
+  await_inputs("base", "head", 0);
+  await_inputs("base", "base", 1);
+  await_inputs("head", "base", 1);
+  const ProgramResult of_head = run_answered("base", {"why", kMotor, "--host", "head"});
   EXPECT_THAT(of_head.out,
               AllOf(HasSubstr("/Motor/speed:i is not open on host head, "),
                     HasSubstr("/Planner/speed:o wins; but nothing of it reaches the port: no "
@@ -79,12 +77,12 @@ TEST_F(WhyOfHosts, WhyOfOneThatDoesNotHaveThePortOpenSaysSo) {
                     HasSubstr("! it is open on host base, which decides it for its component: "
                               "arbiter why /Motor/speed:i --host base\n")));
   const json answer =
-      json::parse(run_arbiter("base", {"why", kMotor, "--host", "head", "--json"}).out);
+      json::parse(run_answered("base", {"why", kMotor, "--host", "head", "--json"}).out);
   EXPECT_EQ(answer["open"], false);
   EXPECT_EQ(answer["winner"], kPlanner);
   EXPECT_EQ(answer["nothing_comes_of_it"], "no component has it open");
   const json of_base =
-      json::parse(run_arbiter("head", {"why", kMotor, "--host", "base", "--json"}).out);
+      json::parse(run_answered("head", {"why", kMotor, "--host", "base", "--json"}).out);
   EXPECT_EQ(of_base["open"], true);
   EXPECT_EQ(of_base["nothing_comes_of_it"], nullptr);
 }
@@ -98,11 +96,10 @@ TEST_F(WhyOfHosts, AConnectionThatAnotherBehaviourWouldSelectIsNotSaidToBeKeptOu
             network());
   Host base("base", runtime_, model + "<condition>/stop:o</condition></behavior></behaviors>",
             network());
-  for (const char* const host : {"base", "head"}) {
-    await_hosts(host, [](const wire::HostsDocument& hosts) { return hosts.hosts.size() == 2; });
-  }
+  await_inputs("base", "head", 0);
+  await_inputs("head", "base", 0);
   const auto causes = [](const char* from, const char* of) {
-    return json::parse(run_arbiter(from, {"why", kMotor, "--host", of, "--json"}).out)
+    return json::parse(run_answered(from, {"why", kMotor, "--host", of, "--json"}).out)
         .at("connections")
         .at(0)
         .at("causes");
@@ -119,17 +116,18 @@ TEST_F(WhyOfHosts, OfAPortThatTwoHostsHaveOpenTheOtherIsNamed) {
   Host base("base", runtime_, motor_model("1000s"), network());
   Body of_head(head);
   Body of_base(base);
-  await_hosts("base", [](const wire::HostsDocument& hosts) {
-    const auto* const there = hosts.find_host("head");
-    return there != nullptr && there->inputs.size() == 1;
-  });
+  await_inputs("base", "head", 1);
+  await_inputs("base", "base", 1);
   const char* const kOther =
       "\n  ! it is also open on host head, and each of them decides it by itself: open it on one "
       "only; arbiter why /Motor/speed:i --host head\n";
-  EXPECT_THAT(run_arbiter("base", {"why", kMotor}).out, HasSubstr(kOther));
-  const json answer = json::parse(run_arbiter("base", {"why", kMotor, "--json"}).out);
-  EXPECT_EQ(answer["also_open_on"], json::array({"head"}));
-  EXPECT_THAT(run_arbiter("base", {"why", kMotor, "--host", "head"}).out,
+  // A link that is slow today is left out.
+  await([&] { return run_arbiter("base", {"why", kMotor}).out.find(kOther) != std::string::npos; });
+  await([] {
+    const json answer = json::parse(run_arbiter("base", {"why", kMotor, "--json"}).out);
+    return answer["also_open_on"] == json::array({"head"});
+  });
+  EXPECT_THAT(run_answered("base", {"why", kMotor, "--host", "head"}).out,
               HasSubstr("\n  ! it is also open on host base, "));
 }
 
@@ -140,10 +138,8 @@ TEST_F(WhyOfHosts, WhoFollowsOneThatDoesNotHaveThePortOpenIsToldSo) {
   Planner planner(head);
   Body body(base);
   body.drive(planner);
-  await_hosts("base", [](const wire::HostsDocument& hosts) {
-    const auto* const here = hosts.find_host("base");
-    return hosts.find_host("head") != nullptr && here != nullptr && here->inputs.size() == 1;
-  });
+  await_inputs("base", "head", 0);
+  await_inputs("base", "base", 1);
   const FollowedPort text(kMotor, "head", {});
   FollowedPort lines(kMotor, "head", {"--json"});
   text.await_text("is not open on host head: /Planner/speed:o, by model 1;");
@@ -196,7 +192,7 @@ TEST_F(WhyOfHosts, WhatHasBecomeOfASourceOnItsHostIsSaid) {
        {std::pair<std::string, std::vector<std::string>>{"base", {"why", kMotor, "--host", "head"}},
         {"base", {"status", "--all"}},
         {"head", {"status"}}}) {
-    const std::string text = run_arbiter(instance, verb).out;
+    const std::string text = run_answered(instance, verb).out;
     EXPECT_THAT(text, AllOf(HasSubstr(pub + " had it open, and died "), death)) << instance;
   }
   head.link().kill();
