@@ -31,6 +31,7 @@ std::vector<WinnerChange> follow(const Run& run, const SetModel& set_model, cons
   WinnerTrack track([&](WinnerChange&& change) { changes.push_back(std::move(change)); });
   track.start(run.start);
   for (const Cue& cue : cues_of(run)) {
+    if (cue.time >= run.until) break;
     if (cue.model != nullptr) {
       set_model(track, *cue.model, cue.time);
     } else {

@@ -13,9 +13,15 @@ std::vector<Cue> cues_of(const Run& run) {
       cues.push_back({step.seen <= run.start ? run.start : last, &source, &step, nullptr});
     }
   }
+  const ModelChange* first = nullptr;  // in force as the run starts
   for (const auto& [generation, model] : run.models) {
-    cues.push_back({std::max(run.start, model.time), nullptr, nullptr, &model});
+    if (model.time <= run.start) {
+      first = &model;
+    } else {
+      cues.push_back({model.time, nullptr, nullptr, &model});
+    }
   }
+  if (first != nullptr) cues.push_back({run.start, nullptr, nullptr, first});
   std::stable_sort(cues.begin(), cues.end(),
                    [](const Cue& one, const Cue& other) { return one.time < other.time; });
   return cues;

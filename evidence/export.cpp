@@ -26,7 +26,9 @@ struct TraceRow {
   bool is_deactivation = false;
 };
 
-std::shared_ptr<const Judge> first_judge(const Run& run, Models& models) {
+// Whose T it was made active for, as far as that is known.
+std::shared_ptr<const Judge> judge_before(const Run& run, const Step& step, Models& models) {
+  if (const auto judge = models.judge(run, step.generation)) return judge;
   return run.models.empty() ? nullptr : models.judge(run, run.models.begin()->first);
 }
 
@@ -34,7 +36,7 @@ std::shared_ptr<const Judge> first_judge(const Run& run, Models& models) {
 Nanoseconds arrival_before(const std::string& source, const Step& step, const Run& run,
                            Models& models) {
   if (!shm::is_finite(step.word)) return step.word & ~shm::kForeverFlag;
-  const auto judge = first_judge(run, models);
+  const auto judge = judge_before(run, step, models);
   const Nanoseconds time =
       judge == nullptr ? run.start : shm::arrival_of(step.word, judge->timeout(source));
   return time >= 0 && time <= run.start ? time : run.start;
@@ -44,6 +46,7 @@ std::vector<TraceRow> trace_of(const Run& run, Models& models) {
   std::vector<TraceRow> rows;
   for (const auto& [source, history] : run.sources) {
     for (const Step& step : history.steps) {
+      if (step.time >= run.until) break;
       const bool is_initial = step.kind == Step::Kind::state && step.seen <= run.start;
       // What a publisher finds that opens the port may be of long ago.
       const bool ends = shm::is_deactivation(step.word) && step.time > run.start;

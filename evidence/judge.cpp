@@ -157,6 +157,8 @@ void Judge::add_moments(const SourceHistory& history, Nanoseconds from, Nanoseco
     if (step.time > from) moments.push_back(step.time);
     if (step.seen < to) moments.push_back(step.seen + 1);
   }
+  const Nanoseconds unknown = history.unknown_from;
+  if (unknown > from && unknown <= to) moments.push_back(unknown);
 }
 
 // Every combination of what the sources may be, by the code that decides live.

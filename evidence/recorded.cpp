@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <set>
 #include <string>
 #include <utility>
 
@@ -10,10 +11,20 @@
 namespace arbiter::evidence {
 namespace {
 
+// A decision rests on what sources did until it was seen. It is seen so long after its arrival at
+// most; of one that is seen later, it is not known what it rests on.
+constexpr Nanoseconds kSeenWithin = 10'000'000'000;
+
 class Loader {
  public:
+  explicit Loader(const TimeSpan& part)
+      : part_(part),
+        known_until_(part.to < shm::kForever - kSeenWithin ? part.to + kSeenWithin
+                                                           : shm::kForever) {}
+
   void take(Record&& record) {
     if (const auto* start = std::get_if<Start>(&record)) {
+      if (start->time <= part_.from) forget();
       runs_.emplace_back();
       runs_.back().start = runs_.back().end = start->time;
       runs_.back().ports = start->ports;
@@ -25,6 +36,9 @@ class Loader {
 
   // `until`: when recording ended, if that is known.
   std::vector<Run> finish(Nanoseconds until) {
+    for (SourceHistory* const each : beyond_) {
+      each->unknown_from = std::min(each->unknown_from, known_until_);
+    }
     if (!runs_.empty()) run().end = std::max(run().end, until);
     for (std::size_t i = 1; i < runs_.size(); ++i) leave_out_strangers(runs_[i - 1], runs_[i]);
     const auto by_time = [](const Decision& one, const Decision& other) {
@@ -34,12 +48,38 @@ class Loader {
       auto& all = run.decisions;
       const bool is_sorted = std::is_sorted(all.begin(), all.end(), by_time);
       if (!is_sorted) std::stable_sort(all.begin(), all.end(), by_time);  // takes memory
+      cut(run);
     }
+    std::erase_if(runs_, [&](const Run& run) { return run.start >= part_.to || is_before(run); });
     return std::move(runs_);
   }
 
  private:
   Run& run() { return runs_.back(); }
+
+  [[nodiscard]] bool is_in_part(Nanoseconds time) const {
+    return time >= part_.from && time < part_.to;
+  }
+  [[nodiscard]] bool is_before(const Run& run) const { return run.end < part_.from; }
+  // What was before the part begins.
+  void forget() {
+    beyond_.clear();
+    runs_.clear();
+  }
+
+  // To the part. What sources did before it is a state of each as it begins.
+  void cut(Run& run) const {
+    run.end = std::min(run.end, part_.to);
+    run.until = part_.to;
+    if (run.start >= part_.from || is_before(run)) return;
+    run.start = part_.from;
+    for (auto& [source, history] : run.sources) {
+      if (history.steps.empty() || history.steps.front().seen >= part_.from) continue;
+      Step& first = history.steps.front();
+      first.kind = Step::Kind::state;
+      first.lost = 0;
+    }
+  }
 
   // Until the recorder notices that a daemon has come with memory of its own, taps tell of that
   // memory already. Of what was done there, the run before knows nothing. Without a model in force
@@ -57,39 +97,45 @@ class Loader {
         run.decisions, [](const Decision& each) { return each.step >= each.source->steps.size(); });
   }
 
-  // Each takes effect after the one before.
-  SourceHistory& add_step(const SourceContext& context, Step step) {
+  // Each takes effect after the one before. Of those that were over before the part began, nothing
+  // rests on any but the last. Null: it lies beyond what decisions of the part rest on.
+  SourceHistory* add_step(const SourceContext& context, Step step) {
     SourceHistory& history = run().sources[context.source];
     if (!history.steps.empty()) {
       step.seen = std::max(step.seen, history.steps.back().seen);
     }
     run().end = std::max(run().end, step.seen);
+    if (step.time >= known_until_) beyond_.insert(&history);
+    if (beyond_.contains(&history)) return nullptr;
+    if (step.seen < part_.from) history.steps.clear();
     history.steps.push_back(step);
-    return history;
+    return &history;
   }
 
   void add(Arrival&& each) {
-    SourceHistory& history =
+    SourceHistory* const history =
         add_step(*each.context,
                  {each.time, each.seen, each.word, Step::Kind::arrival, false, 0, each.generation});
-    history.word = each.word;
-    const auto step = static_cast<std::uint32_t>(history.steps.size() - 1);
+    if (history == nullptr) return;
+    history->word = each.word;
+    if (!is_in_part(each.time)) return;
+    const auto step = static_cast<std::uint32_t>(history->steps.size() - 1);
     run().decisions.push_back(
-        {&history, step, each.is_sample, std::move(each.context), each.sequence, each.masks});
+        {history, step, each.is_sample, std::move(each.context), each.sequence, each.masks});
   }
 
   void add(Deactivation&& each) {
-    SourceHistory& history =
+    SourceHistory* const history =
         add_step(*each.context, {each.time, each.seen, shm::deactivation(each.time),
                                  Step::Kind::deactivation, false, 0, each.generation});
-    history.word = shm::deactivated(history.word, each.time);
+    if (history != nullptr) history->word = shm::deactivated(history->word, each.time);
   }
 
   // Where a state says what was known already, nothing has happened in between: a value stands for
   // one write (shm/activity.hpp).
   void add(SourceState&& each) {
     SourceHistory& history = run().sources[each.context->source];
-    run().lost += each.lost;
+    if (is_in_part(each.seen)) run().lost += each.lost;
     run().end = std::max(run().end, each.seen);
     const bool is_known = !history.steps.empty() && history.word == each.word;
     // It is tapped now; the step below stands behind the gap.
@@ -113,7 +159,7 @@ class Loader {
         step.time = std::clamp(deactivated, step.time, each.seen);
       }
     }
-    add_step(*each.context, step).word = each.word;
+    if (add_step(*each.context, step) != nullptr) history.word = each.word;
   }
 
   void add(ModelChange&& each) {
@@ -132,8 +178,9 @@ class Loader {
   }
   // Of what was overtaken a state says where it goes on.
   void add(Missed&& each) {
-    run().lost_samples += each.samples;
-    if (each.events != 0) {
+    const bool is_of_part = each.to >= part_.from && each.from < part_.to;
+    if (is_of_part) run().lost_samples += each.samples;
+    if (is_of_part && each.events != 0) {
       run().gaps.push_back(each);
       Nanoseconds& since = run().gaps.back().from;
       if (since == 0) since = run().start;
@@ -143,6 +190,10 @@ class Loader {
     from = std::min(from, each.from);
   }
 
+  const TimeSpan part_;
+  const Nanoseconds known_until_;
+  // Those that have done something since then.
+  std::set<SourceHistory*> beyond_;
   std::vector<Run> runs_;
 };
 
@@ -165,9 +216,10 @@ std::string missed_text(const Recorded& recorded) {
   return missed_text(events, samples);
 }
 
-Recorded load_recording(const std::string& path, const recording::Watch& watch, Wanted wanted) {
+Recorded load_recording(const std::string& path, const recording::Watch& watch, Wanted wanted,
+                        const TimeSpan& part) {
   Recorded recorded;
-  Loader loader;
+  Loader loader(part);
   const auto use = [&](Record&& record) { loader.take(std::move(record)); };
   const auto payloads =
       wanted == Wanted::winners ? Payloads::pass_over_with_events : Payloads::pass_over;

@@ -1,7 +1,7 @@
 // A recording in memory: what each source did, what was decided, and by which models.
 //
-// It takes some 130 bytes for each arrival, in pieces: nothing is copied as it grows. Payloads are
-// not read.
+// It takes some 130 bytes for each arrival, in pieces: nothing is copied as it grows. Of a part of
+// a recording, only what is in it takes memory. Payloads are not read.
 #pragma once
 
 #include <cstdint>
@@ -56,6 +56,8 @@ struct Run {
 
   Nanoseconds start = 0;
   Nanoseconds end = 0;
+  // Of a part: steps from then on are there for the decisions alone that were seen later.
+  Nanoseconds until = shm::kForever;
   std::vector<std::string> ports;  // patterns of those that were chosen; empty: all
   std::map<std::string, SourceHistory> sources;
   std::deque<Decision> decisions;               // by time
@@ -83,8 +85,16 @@ struct Recorded {
 // What a recording is read for.
 enum class Wanted : std::uint8_t { all, winners };  // winners: without most steps and decisions
 
-// Throws McapError, RecordError.
+// From one moment to before another, by the recording's clock.
+struct TimeSpan {
+  Nanoseconds from = 0;
+  Nanoseconds to = shm::kForever;
+};
+
+// Of a part: the arrivals in it, what sources did in it, and a state of each source for what it did
+// before. A decision in it rests on the same as in the whole recording. Runs that lie outside are
+// left out. Throws McapError, RecordError.
 [[nodiscard]] Recorded load_recording(const std::string& path, const recording::Watch& watch = {},
-                                      Wanted wanted = Wanted::all);
+                                      Wanted wanted = Wanted::all, const TimeSpan& part = {});
 
 }  // namespace arbiter::evidence

@@ -104,6 +104,18 @@ TEST(Judge, KnowsNothingBehindAGap) {
   EXPECT_FALSE(behind.rests_on_gap);
 }
 
+// While it was decided, the recorder lost sight of the other source.
+TEST(Judge, PermitsBothWhereAnOverrideCannotBeSeenAnyMoreMeanwhile) {
+  Incident incident;
+  incident.add(evidence::Missed{"/high", 1050, 1050, 0, 0, evidence::Missed::Why::refused, "full"});
+  incident.arrive("/low", 1030, 1035, Fate::accepted);
+  incident.arrive("/low", 1040, 1060, Fate::discarded);
+  expect(permitted(incident, 0), true, false);
+  const Permitted meanwhile = permitted(incident, 1);
+  expect(meanwhile, true, true);
+  EXPECT_TRUE(meanwhile.rests_on_gap);
+}
+
 TEST(Judge, KnowsNothingOfASourceThatCouldNotBeTapped) {
   Incident incident;
   incident.add(evidence::Missed{"/high", 1050, 1050, 0, 0, evidence::Missed::Why::refused, "full"});

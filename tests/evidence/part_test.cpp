@@ -1,0 +1,223 @@
+// A part of a recording: what it says is what the whole says of that time.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <random>
+#include <set>
+#include <sstream>
+#include <string>
+#include <tuple>
+#include <vector>
+
+#include "evidence/comparison.hpp"
+#include "evidence/export.hpp"
+#include "evidence/verification.hpp"
+#include "tests/evidence/incident.hpp"
+
+namespace arbiter::test {
+namespace {
+
+using evidence::Recorded;
+using evidence::TimeSpan;
+using evidence::Verification;
+using Fate = Incident::Fate;
+
+Recorded read_part(Incident& incident, TimeSpan part) {
+  return evidence::load_recording(incident.file(), {}, evidence::Wanted::all, part);
+}
+
+// Each source tells its steps in order, some of them late; models come, events are missing, and the
+// recording begins again.
+void fill(Incident& incident, std::mt19937& random, shm::Nanoseconds until) {
+  const auto below = [&](unsigned most) { return static_cast<shm::Nanoseconds>(random() % most); };
+  std::uint64_t generation = 1;
+  shm::Nanoseconds time = 1000;
+  while (time < until) {
+    time += 1 + below(60);
+    const std::string source = below(2) == 0 ? "/low" : "/high";
+    const shm::Nanoseconds seen = time + below(4) * below(40);
+    switch (below(24)) {
+      case 0:
+        incident.deactivate(source, time, seen);
+        break;
+      case 1:
+        incident.state(source, time, seen, shm::arrival(time, 500), evidence::SourceState::Why::gap,
+                       2);
+        break;
+      case 2:
+        incident.put_in_force(generation % 2 == 0 ? kOverride : kReversed, generation + 1, time);
+        ++generation;
+        break;
+      case 3:
+        incident.add(evidence::Start{time, "test", {}, "none"});
+        for (const char* const each : {"/low", "/high"}) {
+          incident.state(each, 0, time, shm::kNeverActive);
+        }
+        incident.put_in_force(kOverride, generation, time);
+        break;
+      default:
+        incident.arrive(source, time, seen, below(2) == 0 ? Fate::accepted : Fate::discarded);
+    }
+  }
+}
+
+using Counts = std::array<std::uint64_t, 6>;
+
+Counts counts_of(const Recorded& recorded) {
+  evidence::Models models(compile_texts);
+  const Verification result = verify(recorded, models);
+  return {result.equal,      result.overlapped,    result.blind,
+          result.behind_gap, result.without_model, result.different};
+}
+
+using Names = std::vector<std::tuple<shm::Nanoseconds, std::string, std::uint64_t>>;
+
+Names names_of(const Recorded& recorded) {
+  Names names;
+  for (const evidence::Run& run : recorded.runs) {
+    for (const evidence::Decision& each : run.decisions) {
+      names.emplace_back(each.arrival().time, each.context->source, each.sequence);
+    }
+  }
+  return names;
+}
+
+TEST(PartOfARecording, HasTheSameOfEachDecisionAsTheWhole) {
+  for (unsigned seed = 1; seed <= 20; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    std::mt19937 random(seed);
+    Incident incident;
+    fill(incident, random, 6000);
+    std::vector<shm::Nanoseconds> cuts{0, shm::kForever};
+    for (int i = 0; i < 3; ++i) cuts.push_back(900 + static_cast<int>(random() % 5200));
+    std::sort(cuts.begin(), cuts.end());
+    Counts sum{};
+    Names names;
+    for (std::size_t i = 0; i + 1 < cuts.size(); ++i) {
+      const Recorded part = read_part(incident, {cuts[i], cuts[i + 1]});
+      const Counts counts = counts_of(part);
+      for (std::size_t k = 0; k < counts.size(); ++k) sum[k] += counts[k];
+      for (auto& name : names_of(part)) names.push_back(std::move(name));
+    }
+    const Recorded whole = incident.read();
+    EXPECT_EQ(sum, counts_of(whole));
+    EXPECT_EQ(names, names_of(whole));
+  }
+}
+
+// Rows of one moment may change places.
+std::multiset<std::string> decided_rows(const Recorded& recorded) {
+  evidence::Models models(compile_texts);
+  std::stringstream text;
+  evidence::write_decisions(recorded, models, text);
+  std::string row;
+  std::getline(text, row);  // the names of the columns
+  std::multiset<std::string> rows;
+  while (std::getline(text, row)) rows.insert(row);
+  return rows;
+}
+
+TEST(PartOfARecording, HasTheSameRowsAsTheWhole) {
+  for (unsigned seed = 1; seed <= 20; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    std::mt19937 random(seed);
+    Incident incident;
+    fill(incident, random, 4000);
+    const shm::Nanoseconds cut = 1100 + static_cast<int>(random() % 2500);
+    auto rows = decided_rows(read_part(incident, {0, cut}));
+    rows.merge(decided_rows(read_part(incident, {cut, shm::kForever})));
+    EXPECT_EQ(rows, decided_rows(incident.read()));
+  }
+}
+
+TEST(PartOfARecording, HasOneStateOfWhatASourceDidBefore) {
+  Incident incident;
+  for (int i = 0; i < 100; ++i) incident.arrive("/low", 1010 + i, 1011 + i, Fate::accepted);
+  incident.arrive("/low", 1300, 1301, Fate::accepted);
+  const Recorded part = read_part(incident, {1200, shm::kForever});
+  ASSERT_EQ(part.runs.size(), 1u);
+  EXPECT_EQ(part.runs[0].start, 1200);
+  EXPECT_EQ(part.runs[0].decisions.size(), 1u);
+  const auto& steps = part.runs[0].sources.at("/low").steps;
+  ASSERT_EQ(steps.size(), 2u);
+  EXPECT_EQ(steps[0].kind, evidence::Step::Kind::state);
+  EXPECT_EQ(steps[0].word, shm::arrival(1109, 500));
+}
+
+TEST(PartOfARecording, IsATraceThatBeginsWithWhoWasActive) {
+  Incident incident;
+  incident.arrive("/low", 1010, 1011, Fate::accepted);
+  incident.arrive("/high", 1600, 1601, Fate::accepted);
+  incident.arrive("/low", 1900, 1901, Fate::discarded);
+  incident.arrive("/high", 2400, 2401, Fate::accepted);
+  evidence::Models models(compile_texts);
+  std::ostringstream trace;
+  evidence::write_trace(read_part(incident, {1800, 2400}), models, trace);
+  EXPECT_EQ(trace.str(), "t_ns,source,event\n1600,/high,arrive\n1900,/low,arrive\n");
+}
+
+TEST(PartOfARecording, HasTheWinnersOfItsTime) {
+  Incident incident;
+  incident.arrive("/high", 1010, 1011, Fate::accepted);
+  incident.arrive("/low", 1100, 1101, Fate::discarded);
+  incident.arrive("/low", 1300, 1301, Fate::discarded);
+  incident.arrive("/low", 2000, 2001, Fate::accepted);
+  evidence::Models models(compile_texts);
+  evidence::Judge reversed(compile_text(kReversed), true);
+  const auto result = compare(read_part(incident, {1200, 1400}), models, reversed);
+  EXPECT_EQ(result.decisions, 1u);
+  EXPECT_EQ(result.changed.size(), 1u);
+  ASSERT_EQ(result.intervals.size(), 1u);
+  EXPECT_EQ(result.intervals[0].from, 1200);
+  EXPECT_EQ(result.intervals[0].to, 1400);
+  EXPECT_EQ(result.intervals[0].recorded, "/high");
+  EXPECT_EQ(result.intervals[0].other, "/low");
+}
+
+// What it rests on was done later than what is kept.
+TEST(PartOfARecording, DoesNotJudgeADecisionThatWasSeenMuchLater) {
+  constexpr shm::Nanoseconds kMuchLater = 20'000'000'000;
+  Incident incident;
+  incident.arrive("/high", 15'000'000'000, 15'000'000'001, Fate::accepted);
+  incident.arrive("/low", 1500, kMuchLater, Fate::discarded);
+  EXPECT_EQ(counts_of(read_part(incident, {1200, 1600})), (Counts{0, 0, 0, 1, 0, 0}));
+  EXPECT_EQ(counts_of(read_part(incident, {1200, shm::kForever})), (Counts{1, 1, 0, 0, 0, 0}));
+}
+
+TEST(PartOfARecording, LeavesOutRunsThatLieOutside) {
+  Incident incident;
+  incident.arrive("/low", 1010, 1011, Fate::accepted);
+  incident.add(evidence::Start{2000, "test", {}, "none"});
+  incident.put_in_force(kOverride, 1, 1990);
+  incident.arrive("/low", 2010, 2011, Fate::accepted);
+  EXPECT_EQ(read_part(incident, {0, 2000}).runs.size(), 1u);
+  EXPECT_EQ(read_part(incident, {2000, shm::kForever}).runs.size(), 1u);
+  EXPECT_EQ(read_part(incident, {1005, 2005}).runs.size(), 2u);
+  EXPECT_TRUE(read_part(incident, {1500, 1600}).runs.empty()) << "nothing was recorded then";
+}
+
+// What is missing before and behind it does not make the part doubtful.
+TEST(PartOfARecording, TellsOfWhatIsMissingInIt) {
+  Incident incident;
+  for (const shm::Nanoseconds each : {1100, 1500, 1900}) {
+    evidence::Missed missed;
+    missed.source = "/low";
+    missed.from = each;
+    missed.to = each + 20;
+    missed.events = 3;
+    missed.samples = 2;
+    incident.add(missed);
+    incident.state("/low", each + 10, each + 20, shm::arrival(each + 10, 500),
+                   evidence::SourceState::Why::gap, 3);
+  }
+  const Recorded part = read_part(incident, {1400, 1600});
+  ASSERT_EQ(part.runs.size(), 1u);
+  EXPECT_EQ(part.runs[0].lost, 3u);
+  EXPECT_EQ(part.runs[0].lost_samples, 2u);
+  ASSERT_EQ(part.runs[0].gaps.size(), 1u);
+  EXPECT_EQ(part.runs[0].gaps[0].from, 1500);
+}
+
+}  // namespace
+}  // namespace arbiter::test
