@@ -134,7 +134,10 @@ bool TapCore::look_at(Stream& stream) noexcept {
   // What it told before is no more than its ring holds: whoever goes on writing is not heard.
   const auto may_have_more = [&] { return stream.behind_end <= stream.source->shape.events; };
   for (int passed = 0; may_have_more() && stream.reader.join(); ++passed) {
-    if (passed == kMaxPassedOver) return false;
+    if (passed == kMaxPassedOver) {  // whoever waits comes again at once, for nobody else may ring
+      shm::ring_bell(bell_.write_end().get());
+      return false;
+    }
     std::uint64_t lost = 0;
     const Found found = stream.reader.read(stream.head, lost);
     if (found == Found::kNothing) break;

@@ -1,5 +1,6 @@
 // A publisher whose memory lies to a tap, and one that is killed while it tells.
 #include <gtest/gtest.h>
+#include <poll.h>
 
 #include <algorithm>
 #include <cstdint>
@@ -331,6 +332,21 @@ TEST(AKilledPublisher, IsReadToItsEnd) {
   }
   EXPECT_EQ(kinds, (std::vector<int>{static_cast<int>(TapEventKind::signal),
                                      static_cast<int>(TapEventKind::closed)}));
+}
+
+// Who waits is rung for it: nobody else does any more.
+TEST(AKilledPublisher, IsReadToItsEndByWhoWaits) {
+  HostilePublisher publisher({1024, 2, 2});
+  const auto tap = publisher.tap(0);
+  shm::EventWriter writer(publisher.events());
+  for (int i = 0; i < 1000; ++i) writer.write({});  // states, of other taps
+  tap->lose_source(5, {});
+  pollfd rung{tap->wait_descriptor(), POLLIN, 0};
+  detail::TapEventData data;
+  bool is_taken = false;
+  while (!is_taken && ::poll(&rung, 1, 0) == 1) is_taken = tap->take(data);
+  ASSERT_TRUE(is_taken);
+  EXPECT_EQ(kind_of(data), TapEventKind::closed);
 }
 
 TEST(AHostilePublisher, WhoseSegmentOfEventsIsNoneIsNotRead) {
