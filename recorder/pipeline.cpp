@@ -141,6 +141,9 @@ void Pipeline::follow(const Record& record) {
     }
   } else if (const auto* model = std::get_if<evidence::ModelChange>(&record)) {
     winners_.set_rules(model->table, model->generation, model->time);
+  } else if (const auto* missed = std::get_if<evidence::Missed>(&record)) {
+    lost_events_ += missed->events;
+    lost_samples_ += missed->samples;
   }
 }
 

@@ -75,8 +75,10 @@ class Pipeline {
 
   // The same. Throws what has gone wrong.
   void finish();
-  // Of the input ports' winners. After finish().
+  // After finish(): of the input ports' winners; what the records say is missing.
   [[nodiscard]] std::uint64_t winner_changes() const { return winner_changes_; }
+  [[nodiscard]] std::uint64_t lost_events() const { return lost_events_; }
+  [[nodiscard]] std::uint64_t lost_samples() const { return lost_samples_; }
 
  private:
   void run();
@@ -100,6 +102,8 @@ class Pipeline {
   evidence::WinnerTrack winners_;
   std::vector<RecordPtr> changes_;  // of winners, by the record that is being followed
   std::uint64_t winner_changes_ = 0;
+  std::uint64_t lost_events_ = 0;
+  std::uint64_t lost_samples_ = 0;
   std::exception_ptr error_;  // of the thread, read after it has ended
   std::thread thread_;
 };

@@ -74,10 +74,8 @@ void Recorder::poll_taps() {
 }
 
 void Recorder::count(const TapReader& tap) {
-  recorded_.arrivals += tap.counts().arrivals;
-  recorded_.lost_events += tap.counts().lost_events;
-  recorded_.lost_samples += tap.counts().lost_samples;
-  if (tap.counts().arrivals != 0) heard_.note(tap.name());
+  recorded_.arrivals += tap.arrivals();
+  if (tap.arrivals() != 0) heard_.note(tap.name());
 }
 
 void Recorder::forget_taps() {
@@ -92,8 +90,7 @@ void Recorder::forget_taps() {
 
 Recorded Recorder::finish() {
   watcher_.stop();
-  watcher_.look_at_model();  // where this process was stopped until now
-  watcher_.look_at_pages();
+  watcher_.look_once_more();
   last_push_ = 0;  // nothing new is news: that it has been recorded until now
   poll_taps();     // those too that it has opened since
   poll_taps();     // the watcher believes a page after two
@@ -103,6 +100,8 @@ Recorded Recorder::finish() {
   pipeline_.finish();
   recorded_.sources = heard_.count();
   recorded_.winner_changes = pipeline_.winner_changes();
+  recorded_.lost_events = pipeline_.lost_events();
+  recorded_.lost_samples = pipeline_.lost_samples();
   recorded_.time = shm::monotonic_now() - started_;
   return recorded_;
 }

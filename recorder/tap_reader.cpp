@@ -141,7 +141,6 @@ void TapReader::add_state(const TapEvent<>& event, Nanoseconds seen,
   state.lost = event.lost();
   state.word = word_of(event);
   if (state.lost != 0) {
-    counts_.lost_events += state.lost;
     add(records, Missed{state.context->source, last_, std::max(last_, state.time), state.lost, 0,
                         Missed::Why::overtaken, ""});
   }
@@ -162,10 +161,9 @@ void TapReader::add_arrival(const TapEvent<>& event, Nanoseconds seen, const Bac
   arrival.word = word_of(event);
   arrival.masks = masks_of(destinations);
   arrival.origin = {event.origin().publisher, event.origin().sequence};
-  ++counts_.arrivals;
+  ++arrivals_;
   if (with_payloads_ && arrival.is_sample) {
     if (const auto why = take_payload(event, backlog, arrival)) {
-      ++counts_.lost_samples;
       add(records, Missed{arrival.context->source, arrival.time, arrival.time, 0, 1, *why, ""});
     }
   }
@@ -191,14 +189,10 @@ void TapReader::leave_out(const TapEvent<>& event, Nanoseconds seen) {
   LeftOut& out = *left_out_;
   out.to = ns(event.time());
   out.events += event.lost();
-  counts_.lost_events += event.lost();
   const bool is_event = event.kind() == TapEventKind::sample ||
                         event.kind() == TapEventKind::signal ||
                         event.kind() == TapEventKind::deactivation;
-  if (is_event) {
-    ++out.events;
-    ++counts_.lost_events;
-  }
+  if (is_event) ++out.events;
   out.last.context = context_of(event);
   out.last.time = ns(event.time());
   out.last.seen = seen;

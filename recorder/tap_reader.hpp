@@ -42,12 +42,6 @@ struct Backlog {
   }
 };
 
-struct TapCounts {
-  std::uint64_t arrivals = 0;
-  std::uint64_t lost_events = 0;
-  std::uint64_t lost_samples = 0;
-};
-
 // What was left out since the last record.
 struct LeftOut {
   std::uint64_t events = 0;
@@ -70,7 +64,7 @@ class TapReader {
 
   // Appends what has happened since; returns true if ports have been opened or closed.
   bool poll(Backlog& backlog, std::vector<RecordPtr>& records);
-  [[nodiscard]] const TapCounts& counts() const { return counts_; }
+  [[nodiscard]] std::uint64_t arrivals() const { return arrivals_; }
   // Nothing more will be read: says what was left out last.
   void finish(std::vector<RecordPtr>& records);
 
@@ -109,7 +103,7 @@ class TapReader {
   const std::size_t most_payload_;
   evidence::ContextPtr context_;
   std::optional<LeftOut> left_out_;
-  TapCounts counts_;
+  std::uint64_t arrivals_ = 0;
   Nanoseconds last_ = 0;  // of what has happened, as far as has been told; 0: nothing has been
   std::atomic<std::uint64_t> polled_{0};  // twice the number of polls, and 1 if a port is open
   std::atomic<evidence::ActivityWord> told_;

@@ -112,6 +112,7 @@ void Watcher::tell_of_daemon() {
 }
 
 void Watcher::look() {
+  const Nanoseconds now = shm::monotonic_now();
   instance_->update();
   tell_of_daemon();
   if (instance_->memory() != memory_) {
@@ -120,7 +121,10 @@ void Watcher::look() {
   }
   look_at_pages();  // first: the daemon may be silent
   ask_daemon();
-  if (options_.ports.empty()) look_for_newcomers();
+  if (options_.ports.empty()) {
+    look_for_newcomers();
+    had_all_ = now;
+  }
   try_refused();
 }
 
@@ -154,6 +158,7 @@ void Watcher::begin() {
   gone_.clear();
   strangers_.clear();
   pages_of_newcomers_ = pages_of_ids_ = 0;
+  had_all_ = 0;
   begun_ = shm::monotonic_now();
   ports_ = OpenPorts(begun_);
   refusals_.clear();
@@ -167,6 +172,7 @@ void Watcher::begin() {
   for (const std::string& source : chosen_sources(model)) open_tap(source, taps);
   const bool has_tap = std::any_of(sources_.begin(), sources_.end(),
                                    [](const auto& each) { return each.second.tap != nullptr; });
+  if (options_.ports.empty()) had_all_ = begun_;
   const std::vector<std::string> refused = take_refusals();
   if (!has_begun_ && !has_tap && !refused.empty()) throw Error(refused.front());
   has_begun_ = true;
@@ -221,6 +227,11 @@ void Watcher::open_tap(const std::string& source, Batch& batch) {
     watched.seen = watched.reported = word;
     watched.tap = std::make_shared<TapReader>(std::move(tap), with_payloads, word);
     opened_.push_back(watched.tap);
+    const bool is_late = had_all_ != 0 && watched.next_try == 0 && word != shm::kNeverActive;
+    if (!is_late) return;
+    batch.add(evidence::Missed{source, had_all_, shm::monotonic_now(), 1, 0,
+                               evidence::Missed::Why::overtaken,
+                               "how often it had arrived when it was found is not known"});
   } catch (const Error& error) {
     const bool is_known = watched.next_try != 0;
     watched.pause = std::clamp(2 * watched.pause, kTryAgainAfter, kTryAgainAtLeastEvery);
@@ -338,12 +349,30 @@ void Watcher::find_ids() {
   pages_of_ids_ = pages;
 }
 
-void Watcher::look_at_model() {
-  if (memory_ == nullptr || !instance_->has_daemon()) return;
+void Watcher::look_once_more() {
+  look_at_pages();  // the daemon may be silent
   try {
-    if (memory_->tables().generation() != generation_) take_up_model();
+    if (!instance_->has_daemon()) return;
+    instance_->catch_up();
+    last_ports_ = 0;
+    look();
+    hear_what_was_told();
   } catch (const std::exception&) {  // it does not answer, or refuses
   }
+}
+
+// The node is told in order: behind an answer to it, it has heard all that was said before.
+void Watcher::hear_what_was_told() {
+  const auto is_quiet = [](const auto& each) {  // no publisher is asked for it
+    return each.second.tap != nullptr && !each.second.tap->polled().is_live;
+  };
+  auto any = std::find_if(sources_.begin(), sources_.end(), is_quiet);
+  if (any == sources_.end()) any = sources_.begin();
+  if (memory_ == nullptr || any == sources_.end()) return;
+  TapOptions options;
+  options.may_wait = false;
+  options.max_held = 0;
+  static_cast<void>(node_->tap(any->first, options));
 }
 
 // What nobody tells: an operator deactivates a source whose port is closed; a publisher dies

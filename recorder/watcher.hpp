@@ -50,8 +50,9 @@ class Watcher {
   void start();
   void stop();
   // Once it is stopped: for what has happened last. It does so by itself before. The first asks the
-  // daemon, if another model has come into force.
-  void look_at_model();
+  // daemon, and returns once the taps have all that it has told them: where this process was
+  // stopped until now, nothing has been taken up yet.
+  void look_once_more();
   void look_at_pages();
 
   // The thread that polls.
@@ -80,6 +81,7 @@ class Watcher {
   [[nodiscard]] evidence::ModelChange model_change(const watch::ModelInForce& model) const;
   [[nodiscard]] std::shared_ptr<const evidence::RuleTable> rule_table() const;
   void open_tap(const std::string& source, Batch& batch);
+  void hear_what_was_told();
   // Texts about the sources that cannot be recorded, and were not reported yet.
   [[nodiscard]] std::vector<std::string> take_refusals();
   void tap_newcomers(const std::set<std::string>& sources, Batch& batch);
@@ -132,6 +134,8 @@ class Watcher {
   std::uint64_t pages_of_newcomers_ = 0;
   std::uint64_t pages_of_ids_ = 0;
   Nanoseconds begun_ = 0;
+  // When all sources that there were had taps, where all are recorded; 0: never yet.
+  Nanoseconds had_all_ = 0;
   // Output ports and their processes, of components that the daemon does not know.
   std::set<std::pair<std::string, std::int32_t>> strangers_;
   OpenPorts ports_{0};

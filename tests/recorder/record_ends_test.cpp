@@ -59,6 +59,50 @@ TEST(Record, HasTheModelThatCameIntoForceWhileItWasStopped) {
   EXPECT_EQ(models[1].generation, daemon.status()["model"]["generation"]);
 }
 
+// Nor has its tap been told of the port.
+TEST(Record, HasWhatAPortDidThatWasOpenedWhileItWasStopped) {
+  Daemon daemon(kLasting);
+  Recording recording(daemon);
+  recording.process().stop();
+  Node node("test");
+  auto low = node.output_port<int>("/low");
+  constexpr std::uint64_t kSamples = 3;
+  for (std::uint64_t i = 0; i < kSamples; ++i) low.publish(1);
+  recording.process().signal(SIGINT);
+  EXPECT_EQ(recording.end(SIGCONT), 0) << recording.error();
+  const auto arrivals = recording.records<Arrival>();
+  ASSERT_EQ(arrivals.size(), kSamples);
+  const auto winners = recording.records<evidence::WinnerChange>();
+  ASSERT_EQ(winners.size(), 1U);
+  EXPECT_EQ(winners[0].winner, "/low");
+  EXPECT_EQ(winners[0].time, arrivals[0].time);
+  const auto ports = recording.records<evidence::PortChange>();
+  ASSERT_EQ(ports.size(), 1U);
+  EXPECT_EQ(ports[0].port, "/low");
+  EXPECT_TRUE(recording.records<evidence::Missed>().empty());
+}
+
+// Of a name that nobody has had, there is no tap yet.
+TEST(Record, SaysThatItMissedWhatANewSourceDidBeforeItWasFound) {
+  Daemon daemon(kLasting);
+  Recording recording(daemon);
+  const shm::Nanoseconds before = shm::monotonic_now();
+  recording.process().stop();
+  Node node("test");
+  auto port = node.output_port<int>("/new");
+  port.publish(1);
+  const shm::Nanoseconds after = shm::monotonic_now();
+  recording.process().signal(SIGINT);
+  EXPECT_EQ(recording.end(SIGCONT), 0) << recording.error();
+  const auto missed = recording.records<evidence::Missed>();
+  ASSERT_EQ(missed.size(), 1U);
+  EXPECT_EQ(missed[0].source, "/new");
+  EXPECT_EQ(missed[0].events, 1U);
+  EXPECT_LT(missed[0].from, after);
+  EXPECT_GT(missed[0].to, before);
+  EXPECT_THAT(recording.output(), HasSubstr("missed 1 event,"));
+}
+
 TEST(Record, IsReadUpToTheLastChunkAfterAKill) {
   Daemon daemon(kOverrideModel);
   Node node("test");
