@@ -157,6 +157,27 @@ void write_dropped(const std::string& verb, const std::string& instance,
   }
 }
 
+// A daemon that does not know the flag has tried a reload: its report is about something else.
+void require_way_back(const wire::Message& question, const wire::Received& answer,
+                      const wire::ChangeReport& report) {
+  const bool goes_back = (question.flags & wire::kGoesBack) != 0;
+  if (!goes_back || !report.ok || report.back_to) return;
+  const std::string why = answer.message.kind == wire::MessageKind::kDone
+                              ? "the daemon had no descriptor left for its report"
+                              : "the daemon is older than this program, and cannot say what a "
+                                "rollback would do";
+  throw std::runtime_error(why + "; nothing has changed");
+}
+
+// What to type in place of the dry run.
+std::string command_for(const std::string& verb, const std::string& instance,
+                        const wire::ChangeReport& report) {
+  std::string command = "arbiter " + verb;
+  if (report.back_to) command += ' ' + std::to_string(report.back_to->generation);
+  if (!instance.empty()) command += " --instance " + instance;
+  return command;
+}
+
 // One model of several, in a dry run. A difference begins with a line of its own.
 void write_changes(const wire::ModelComparison& model, bool is_alone) {
   const std::string text = model.changes
@@ -176,11 +197,13 @@ wire::ChangeReport ask_for_change(const std::string& verb, const std::string& in
                                   wire::Message question, bool json) {
   question.flags |= wire::kWantsReport;
   wire::Call daemon(caller(verb, instance));
-  const std::string text = wire::change_report_text(daemon.ask(question));
+  const wire::Received answer = daemon.ask(question);
+  const std::string text = wire::change_report_text(answer);
   wire::ChangeReport report = wire::read_change_report(text);
+  require_way_back(question, answer, report);
+  const bool is_dry_run = (question.flags & wire::kDryRun) != 0;
   nlohmann::json document = wire::parse_document(text);
   if (json) {
-    const bool is_dry_run = (question.flags & wire::kDryRun) != 0;
     const auto ports = unmentioned(verb, instance, report, is_dry_run);
     document["unmentioned"] = ports ? nlohmann::json(*ports) : nlohmann::json(nullptr);
     std::cout << wire::write_document(document);
@@ -211,14 +234,8 @@ int change_model(const std::string& verb, const std::string& instance,
 int preview_change(const std::string& verb, const std::string& instance,
                    const wire::Message& question, bool json) {
   const auto report = ask_for_change(verb, instance, question, json);
-  const bool goes_back = (question.flags & wire::kGoesBack) != 0;
-  if (report.ok && goes_back && !report.back_to) {
-    throw std::runtime_error(
-        "the daemon is older than this program, and cannot say what a rollback would do; nothing "
-        "has changed");
-  }
   if (json || !report.ok) return report.ok ? 0 : 1;
-  if (goes_back) {
+  if (report.back_to) {
     write_past("back to model " + std::to_string(report.back_to->generation) + ": ",
                *report.back_to);
   }
@@ -229,9 +246,8 @@ int preview_change(const std::string& verb, const std::string& instance,
     std::cout << "the policy " << report.policy->file << " differs from the one in force: it has "
               << rules::counted(report.policy->rules, "rule") << '\n';
   }
-  std::cout << "this was a dry run: arbiter " << verb
-            << (goes_back ? ' ' + std::to_string(report.back_to->generation) : std::string())
-            << " puts " << (goes_back ? "that model" : "the files") << " in force\n";
+  std::cout << "this was a dry run: " << command_for(verb, instance, report) << " puts "
+            << (report.back_to ? "that model" : "the files") << " in force\n";
   return 0;
 }
 
