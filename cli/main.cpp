@@ -95,7 +95,13 @@ void add_exit_codes(CLI::App& app) {
 // `arbiter help VERB` as well as `arbiter VERB --help`.
 std::vector<std::string> words_of(int argc, char** argv) {
   std::vector<std::string> words(argv + std::min(argc, 1), argv + argc);
-  if (words.empty() || words.front() != "help") return words;
+  if (words.empty()) return words;
+  if (words.front() == "diff") {
+    for (std::string& word : words) {  // "-,b.xml" is an option to CLI11
+      if (word.starts_with("-,")) word.replace(0, 1, "/dev/stdin");
+    }
+  }
+  if (words.front() != "help") return words;
   words.erase(words.begin());
   words.emplace_back("--help");
   return words;

@@ -10,13 +10,15 @@
 
 namespace arbiter::cli {
 
-CLI::Validator dash_for_input() {
-  return {[](std::string& file) {
-            if (file == "-") file = "/dev/stdin";
-            return std::string();
-          },
-          ""};
+std::string take_input(std::string& file) {
+  constexpr const char* kStandardInput = "/dev/stdin";
+  static bool is_taken = false;
+  if (file == "-") file = kStandardInput;
+  if (file != kStandardInput || !std::exchange(is_taken, true)) return "";
+  return "standard input is read for another file already, and only once; give this one by name";
 }
+
+CLI::Validator dash_for_input() { return {take_input, ""}; }
 
 CLI::Option& add_model_options(CLI::App& verb, rules::ModelFiles& files) {
   CLI::Option* models =
@@ -28,7 +30,8 @@ CLI::Option& add_model_options(CLI::App& verb, rules::ModelFiles& files) {
   verb.add_option(
           "--application", files.application,
           "File that says which connections exist; without it, the model's connections exist")
-      ->type_name("FILE");
+      ->type_name("FILE")
+      ->transform(dash_for_input());
   return *models;
 }
 

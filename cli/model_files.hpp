@@ -2,6 +2,7 @@
 #pragma once
 
 #include <optional>
+#include <string>
 
 #include "rules/model/load.hpp"
 #include "rules/prove/compile.hpp"
@@ -15,7 +16,9 @@ class Validator;
 
 namespace arbiter::cli {
 
-// Takes "-" for standard input, as -o takes it for standard output.
+// Takes "-" for standard input, as -o takes it for standard output. Only one file of a command
+// line may be that: whoever reads it again finds nothing. What is wrong; empty: nothing.
+std::string take_input(std::string& file);
 CLI::Validator dash_for_input();
 
 // MODEL..., which it gives back, and --application.

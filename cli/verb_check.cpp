@@ -266,14 +266,17 @@ void add_check(CLI::App& app, int& exit_code) {
   verb->add_option("--assert", options->statements,
                    "File of statements that must be true in every state, one on each line")
       ->type_name("FILE")
+      ->transform(dash_for_input())
       ->allow_extra_args(false);
   verb->add_option("--gateway", options->gateways,
                    "Mapping of a gateway, to be looked at beside the model (docs/gateways.md)")
       ->type_name("FILE")
+      ->transform(dash_for_input())
       ->allow_extra_args(false);
   verb->add_option("--hosts", options->hosts,
                    "Application whose modules have <node>s: also check what crosses the network")
-      ->type_name("FILE");
+      ->type_name("FILE")
+      ->transform(dash_for_input());
   verb->add_option("--silence", options->silenced,
                    "Hide warnings and notes with this code, such as nobody-wins")
       ->type_name("CODE")

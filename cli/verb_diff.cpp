@@ -33,6 +33,23 @@ std::vector<std::string> files_of(const std::string& argument) {
   return CLI::detail::split(argument, ',');
 }
 
+// As dash_for_input(), of each of them.
+std::string take_inputs(std::string& argument) {
+  std::string taken;
+  for (std::string file : files_of(argument)) {
+    if (std::string problem = take_input(file); !problem.empty()) return problem;
+    taken += (taken.empty() ? "" : ",") + file;
+  }
+  argument = taken;
+  return "";
+}
+
+std::string problem_of_common_file(std::string& file) {
+  if (file != "-" && file != "/dev/stdin") return "";
+  return "this is read for each of the two models, and standard input only once; give a file by "
+         "name";
+}
+
 std::optional<Model> load_side(const DiffOptions& options, const std::string& files,
                                const std::string& application) {
   rules::ModelFiles model{files_of(files), {}};
@@ -72,18 +89,21 @@ void add_diff(CLI::App& app, int& exit_code) {
   verb->add_option("BEFORE", options->before,
                    "A model; if it has several files: a.xml,b.xml; -: standard input")
       ->type_name("FILE")
-      ->transform(dash_for_input())
+      ->transform(CLI::Validator(take_inputs, ""))
       ->required();
   verb->add_option("AFTER", options->after, "The model to compare it with")
       ->type_name("FILE")
-      ->transform(dash_for_input())
+      ->transform(CLI::Validator(take_inputs, ""))
       ->required();
   verb->add_option("--application", options->application, "Connections of both models")
-      ->type_name("FILE");
+      ->type_name("FILE")
+      ->check(CLI::Validator(problem_of_common_file, ""));
   verb->add_option("--application-before", options->application_before, "Connections of BEFORE")
-      ->type_name("FILE");
+      ->type_name("FILE")
+      ->transform(dash_for_input());
   verb->add_option("--application-after", options->application_after, "Connections of AFTER")
-      ->type_name("FILE");
+      ->type_name("FILE")
+      ->transform(dash_for_input());
   add_effort_option(*verb, options->effort);
   verb->add_flag("--json", options->json, "Write the differences as JSON");
   verb->footer(

@@ -46,8 +46,8 @@ void add_graph(CLI::App& app, int& exit_code) {
   add_model_options(*verb, options->files)
       .required(false)
       ->description(
-          "Files of behaviours and rules; with --live you may leave them out: the model in force "
-          "is drawn");
+          "Files of behaviours and rules; -: standard input; with --live you may leave them out: "
+          "the model in force is drawn");
   verb->add_option("--view", options->view,
                    "behaviours: in meta-behaviours, with inhibitions; connections: components, "
                    "ports, rules; both; auto: behaviours if there are any")
@@ -77,6 +77,7 @@ void add_graph(CLI::App& app, int& exit_code) {
                    "Application whose modules have <node>s: draw connections in boxes of hosts; "
                    "with --live the links say where things are")
       ->type_name("FILE")
+      ->transform(dash_for_input())
       ->excludes(live)
       ->excludes(follow);
   add_instance_option(*verb, options->instance);

@@ -11,6 +11,7 @@
 #include <CLI/CLI.hpp>
 
 #include "cli/first_output.hpp"
+#include "cli/model_files.hpp"
 #include "cli/numbers.hpp"
 #include "cli/output_file.hpp"
 #include "cli/verbs.hpp"
@@ -273,8 +274,10 @@ void add_import(CLI::App& app, int& exit_code) {
       ->check(CLI::Validator(problem_of_kind, ""));
   verb->add_option(
           "YAML", options->files,
-          "Files of parameters, of ROS 2 or ROS 1; together they configure one multiplexer")
+          "Files of parameters, of ROS 2 or ROS 1; together they configure one multiplexer; -: "
+          "standard input")
       ->type_name("FILE")
+      ->transform(dash_for_input())
       ->required();
   add_outputs(*verb, *options);
   add_names(*verb, *options);

@@ -20,6 +20,7 @@
 #include <CLI/CLI.hpp>
 
 #include "cli/live.hpp"
+#include "cli/model_files.hpp"
 #include "cli/numbers.hpp"
 #include "cli/pub_type.hpp"
 #include "cli/verbs.hpp"
@@ -259,7 +260,10 @@ void add_play(CLI::App& app, int& exit_code) {
   const auto options = std::make_shared<PlayOptions>();
   CLI::App* verb =
       app.add_subcommand("play", "Publish a trace in real time, and show what was delivered");
-  verb->add_option("TRACE", options->trace, "CSV: t_ns,source or t_ns,source,event")->required();
+  verb->add_option("TRACE", options->trace,
+                   "CSV: t_ns,source or t_ns,source,event; -: standard input")
+      ->transform(dash_for_input())
+      ->required();
   verb->add_option("--speed", options->speed, "How many times faster than the trace (default 1)")
       ->type_name("X")
       ->check(number_between(1e-3, 1e6));

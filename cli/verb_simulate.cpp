@@ -134,7 +134,8 @@ void add_simulate(CLI::App& app, int& exit_code) {
                          "Decide a trace or a recording again, and show what would have been "
                          "delivered");
   add_model_options(*verb, options->files).required(false);
-  auto* trace = verb->add_option("--trace", options->trace, "CSV: t_ns,source or t_ns,source,event")
+  auto* trace = verb->add_option("--trace", options->trace,
+                                 "CSV: t_ns,source or t_ns,source,event; -: standard input")
                     ->type_name("FILE")
                     ->transform(dash_for_input());
   auto* recording =
@@ -143,7 +144,9 @@ void add_simulate(CLI::App& app, int& exit_code) {
                        "it with the live one. With a model: what would be different under that")
           ->type_name("FILE")
           ->excludes(trace);
-  verb->add_option("--model", options->files.models, "The same as MODEL")->type_name("FILE");
+  verb->add_option("--model", options->files.models, "The same as MODEL")
+      ->type_name("FILE")
+      ->transform(dash_for_input());
   // A flag takes a value only behind '=': what follows it may be the model.
   auto* why = verb->add_flag("--why", options->why,
                              "Instead of the CSV, or of what is compared, show each change of a "
