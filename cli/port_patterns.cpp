@@ -42,6 +42,19 @@ std::string_view same_beginning(std::string_view name, std::string_view before_s
   return name.substr(0, at);
 }
 
+// As many parts of a name as the pattern begins, to the end of the last of them.
+std::string_view same_parts(std::string_view name, std::string_view before_star) {
+  if (before_star.ends_with('/')) return {};
+  const auto parts = std::count(before_star.begin(), before_star.end(), '/');
+  std::size_t at = 0;
+  for (auto left = parts; left > 0 && at != std::string_view::npos; --left) {
+    at = name.find('/', at);
+    if (at != std::string_view::npos) ++at;
+  }
+  if (at == std::string_view::npos) return {};
+  return name.substr(0, name.find_first_of("/:", at));
+}
+
 constexpr const char* kIsOutput = "output port: name an input port that it is connected to";
 
 }  // namespace
@@ -50,13 +63,16 @@ std::string similar_pattern(const std::string& pattern,
                             const std::vector<std::string_view>& names) {
   const std::size_t star = pattern.find('*');
   if (star == std::string::npos) return rules::find_similar(pattern, names).value_or("");
-  const std::string_view before = std::string_view(pattern).substr(0, star);
+  std::string before = pattern.substr(0, star);
+  if (!before.empty() && before.front() != '/') before.insert(0, 1, '/');
   std::set<std::string> candidates;
   for (const std::string_view name : names) {
-    std::string candidate(same_beginning(name, before));
-    if (candidate.empty()) continue;
-    candidate += pattern.substr(star);
-    if (rules::matches(candidate, name)) candidates.insert(std::move(candidate));
+    for (const std::string_view beginning :
+         {same_beginning(name, before), same_parts(name, before)}) {
+      if (beginning.empty()) continue;
+      std::string candidate = std::string(beginning) + pattern.substr(star);
+      if (rules::matches(candidate, name)) candidates.insert(std::move(candidate));
+    }
   }
   return rules::find_similar(pattern, {candidates.begin(), candidates.end()}).value_or("");
 }
