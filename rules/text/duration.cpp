@@ -122,9 +122,12 @@ ParsedDuration parse_duration(std::string_view text, const DurationWords& words)
     const std::string why = unit.front() == ' ' ? "has a blank" : "has an unknown unit";
     if (const auto ours = in_our_units(number, unit); !ours.empty())
       return refuse(why, "write " + ours + " in its place");
-    if (const auto minutes = in_our_units(number, "min"); trim(unit) == "m" && !minutes.empty()) {
-      return refuse("has an unknown unit", "write " + minutes + " for minutes, or " +
-                                               std::string(number) + "ms for milliseconds");
+    if (const auto seconds = in_our_units(number, "min");
+        lower_case(trim(unit)) == "m" && !seconds.empty()) {
+      const std::string count(number);
+      return refuse("has an unknown unit", "write " +
+                                               (words.takes_minutes ? count + "min" : seconds) +
+                                               " for minutes, or " + count + "ms for milliseconds");
     }
     const bool is_fraction = unit.starts_with('.') || unit.starts_with(',');
     if (find_unit(trim(unit), words.takes_minutes) != nullptr)

@@ -67,6 +67,7 @@ TEST(Duration, OfAnotherUnitTheSameInOneOfOursIsTold) {
       {"5 parsecs", "has an unknown unit; write a whole number"},
       {"5 m", "has an unknown unit; write 300s for minutes, or 5ms for milliseconds"},
       {"5m", "has an unknown unit; write 300s for minutes, or 5ms for milliseconds"},
+      {"5M", "has an unknown unit; write 300s for minutes, or 5ms for milliseconds"},
       {"0m", "has an unknown unit; write a whole number"},
       {"2305843009213693952h", "has an unknown unit; write a whole number"},
       {"0h", "has an unknown unit; write a whole number"},
@@ -74,6 +75,10 @@ TEST(Duration, OfAnotherUnitTheSameInOneOfOursIsTold) {
   for (const auto& [text, advice] : cases) {
     EXPECT_THAT(parse_duration(text).problem, HasSubstr(advice)) << text;
   }
+  DurationWords words;
+  words.takes_minutes = true;
+  EXPECT_THAT(parse_duration("5m", words).problem,
+              HasSubstr("write 5min for minutes, or 5ms for milliseconds"));
 }
 
 TEST(Duration, IsWrittenInTheLargestUnitWithoutAFraction) {
