@@ -102,9 +102,30 @@ Explanation explain_mismatch(const TextFile& file, const Scan& scanned,
           "this closing tag does not fit " + opened + ", which must be closed first"};
 }
 
-// An operator of conditions, or what others write for it.
-bool is_equivalence(std::string_view text) {
-  return text.starts_with("<->") || text.starts_with("<=>");
+// What to write for a '<' that begins no tag: an operator, or what others write for one.
+std::string_view advice_on_less_than(std::string_view text, const std::vector<Tag>& open) {
+  if (text.starts_with("<->") || text.starts_with("<=>")) return "write iff for this operator";
+  const bool is_condition =
+      !open.empty() && (open.back().name == "condition" || open.back().name == "select");
+  if (!is_condition) return "where the character is meant, write &lt;";
+  if (text.starts_with("<-") || text.starts_with("<=")) {
+    return "write implies, and what follows behind it";
+  }
+  return "a condition compares nothing, it says which sources are active";
+}
+
+// What decode() would say of the text in front of the place where the file cannot be read further.
+// Of an application it would say it of few elements.
+void report_references(const TextFile& file, std::size_t end, Diagnostics& diagnostics) {
+  const std::string_view content = file.content().substr(0, end);
+  if (root_name(content) == "application") return;
+  for (std::size_t at = 0; at < end;) {
+    const auto markup = find_markup(content, at);
+    const std::size_t text_end = markup ? markup->begin : end;
+    Text ignored(file, at);
+    decode(file, content.substr(at, text_end - at), ignored, diagnostics);
+    at = markup ? markup->end : end;
+  }
 }
 
 Explanation explain(const TextFile& file, const pugi::xml_parse_result& result) {
@@ -127,10 +148,9 @@ Explanation explain(const TextFile& file, const pugi::xml_parse_result& result) 
     case pugi::status_bad_attribute:
       return here("an attribute of this tag is malformed; write name=\"value\"");
     case pugi::status_unrecognized_tag:
-      return here(std::string("'<' must begin a tag here; ") +
-                  (is_equivalence(file.content().substr(scanned.construct))
-                       ? "write iff for this operator"
-                       : "where the character is meant, write &lt;"));
+      return here(
+          "'<' must begin a tag here; " +
+          std::string(advice_on_less_than(file.content().substr(scanned.construct), scanned.open)));
     case pugi::status_bad_end_element:
     case pugi::status_end_element_mismatch:
       return explain_mismatch(file, scanned, result.status);
@@ -212,6 +232,7 @@ std::optional<XmlDocument> parse_xml(const TextFile& file, Diagnostics& diagnost
       parsed.load_buffer_inplace(buffer.data(), buffer.size(), kParseFlags, pugi::encoding_utf8);
   if (!result) {
     const Explanation explanation = explain(file, result);
+    report_references(file, explanation.offset, diagnostics);
     report(file, explanation.offset, explanation.message, diagnostics);
     return {};
   }

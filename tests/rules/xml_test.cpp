@@ -91,6 +91,8 @@ TEST(Xml, MalformedIsReportedWhereItBeginsToBe) {
       {"<a>1 <2</a>", "1:6", "write &lt;"},
       {"<a/><", "1:5", "write &lt;"},
       {"<a>/x <-> /y</a>", "1:7", "write iff for this operator"},
+      {"<condition>/x < /y</condition>", "1:15", "a condition compares nothing"},
+      {"<select>/x <= /y</select>", "1:12", "write implies, and what follows behind it"},
       {"<a/>\n<!-- b", "2:1", "close it with -->"},
       {"<a><![CDATA[b", "1:4", "close it with ]]>"},
       {"<?xml version='1.0'", "1:1", "close it with ?>"},
@@ -101,6 +103,22 @@ TEST(Xml, MalformedIsReportedWhereItBeginsToBe) {
     EXPECT_THAT(parsed(c.content), HasSubstr(c.message)) << c.content;
     EXPECT_EQ(parsed(c.content).substr(0, c.place.size() + 1), c.place + " ") << c.content;
   }
+}
+
+// Whoever has mended only what was told would be refused again.
+TEST(Xml, ReferencesInFrontOfWhatIsMalformedAreReportedBesideIt) {
+  const auto places = [](const std::string& content) {
+    const TextFile file("f", content);
+    Diagnostics diagnostics;
+    EXPECT_FALSE(parse_xml(file, diagnostics));
+    std::vector<unsigned> columns;
+    for (const auto& item : diagnostics.items()) columns.push_back(item.where.column);
+    return columns;
+  };
+  EXPECT_THAT(places("<a><b>x && y</b><c>x &amp; y & z < u</c></a>"), ElementsAre(9, 30, 34));
+  EXPECT_THAT(places("<a b='&'><!-- & --><![CDATA[ & ]]> < & </a>"), ElementsAre(36));
+  EXPECT_THAT(places("<application><name>x & y</name></b>"), ElementsAre(32))
+      << "not ours to judge";
 }
 
 TEST(Xml, ReferencesAreDecodedAndKeepTheirPlace) {
