@@ -220,6 +220,10 @@ class ApplicationReader {
       }
     }
     std::string advice = "write the name of a port in it";
+    if (ElementReader::has_attribute(connection, tag)) {
+      advice = "it is no attribute: write <" + std::string(tag) + ">…</" + std::string(tag) +
+               "> between the tags";
+    }
     for (const XmlNode& element : Elements(connection.first_child)) {
       if (element.text == "from" || element.text == "to" || !misspelt_for(element.text, {tag})) {
         continue;

@@ -18,7 +18,7 @@ class BehaviourReader {
 
   void read(const XmlNode& element) {
     behaviour_.is_meta = is_meta_behaviour(element.text);
-    reader_.check_attributes(element, {"name"});
+    if (!reader_.check_attributes(element, {"name"})) doubt_attributes(element);
     // It may be a condition without its tags.
     if (!reader_.check_no_text(element.first_child)) behaviour_.is_incomplete = true;
     read_name(element);
@@ -31,6 +31,15 @@ class BehaviourReader {
   }
 
  private:
+  // An inhibition that was written as an attribute keeps nobody out.
+  void doubt_attributes(const XmlNode& element) {
+    for (const XmlAttribute& attribute : element.attributes) {
+      if (attribute.name.starts_with("inhibit")) behaviour_.lacks_inhibitions = true;
+      if (attribute.name == "condition") behaviour_.is_incomplete = true;
+    }
+    if (behaviour_.lacks_inhibitions) behaviour_.is_incomplete = true;
+  }
+
   void read_name(const XmlNode& element) {
     const auto written = reader_.attribute(element, "name");
     const auto name = written ? reader_.name(*written, "the name of this behaviour") : std::nullopt;

@@ -73,6 +73,13 @@ std::string_view advice_on(std::string_view attribute, std::string_view element,
     return "in the model name those that a behaviour keeps out in its <inhibition>, or write "
            "<arbiter at=\"…\" conflict=\"first\"/>, so that the first in the file wins";
   }
+  if (contains({"behavior", "behaviour", "meta_behavior", "meta_behaviour"}, element)) {
+    if (attribute.starts_with("inhibit")) {
+      return "write <inhibition>…</inhibition> between its tags, with the names of those that it "
+             "keeps out";
+    }
+    if (attribute == "condition") return "write <condition>…</condition> between its tags";
+  }
   if (element == "define" && attribute == "value") {
     return "write the value between the tags: <define name=\"…\">…</define>";
   }
@@ -88,12 +95,24 @@ std::string_view advice_on(std::string_view attribute, std::string_view element,
 
 // Of an element that is no other's. Empty: nothing is known of it.
 std::string_view advice_on_element(std::string_view name, KnownNames known) {
+  if (name == "priority" && contains(known, "select")) return advice_on(name, "select", known);
   if (name == "timeout" || name == "priority") return advice_on(name, "", known);
   if (!contains(known, "inhibition")) return {};
+  if (name == "name") return "it is an attribute: <behavior name=\"…\">";
   if (name == "inhibits") return "did you mean <inhibition>?";
   if (name.starts_with("inhibited")) {
     return "an <inhibition> stands in the behaviour that inhibits, and names those that it keeps "
            "out";
+  }
+  return {};
+}
+
+// Of one inside an element that takes text only.
+std::string_view advice_on_part(std::string_view part, std::string_view element) {
+  if (part == "priority") return advice_on(part, element, {});
+  if (element == "config" && contains({"from", "to", "at"}, part)) {
+    return "write <config at=\"…\">…</config>, with the input port in the attribute at, and the "
+           "output port between the tags";
   }
   return {};
 }
@@ -169,9 +188,12 @@ std::optional<Text> ElementReader::text(const XmlNode& element) {
   bool fine = true;
   for (const XmlNode* child = element.first_child; child != nullptr; child = child->next) {
     if (child->kind == XmlKind::kElement) {
-      error("unknown-element", where(*child),
-            in_brackets(element) + " takes text only, no " + in_brackets(*child) +
-                "; remove it, or close " + in_brackets(element) + " before it");
+      error("unknown-element", where(*child), [&] {
+        const std::string_view better = advice_on_part(child->text, element.text);
+        return in_brackets(element) + " takes text only, no " + in_brackets(*child) + "; " +
+               (better.empty() ? "remove it, or close " + in_brackets(element) + " before it"
+                               : std::string(better));
+      });
       return {};
     }
     if (child->kind == XmlKind::kCData) {
@@ -204,6 +226,11 @@ void ElementReader::report_unknown_element(const XmlNode& element, KnownNames kn
     if (contains(known, "config") && find_similar(element.text, {"connection"})) {
       return in_brackets(element) +
              " is not known here; write a connection as <config at=\"…\">…</config>";
+    }
+    if (contains(known, "behavior") && find_similar(element.text, {"connection"})) {
+      return in_brackets(element) +
+             " is not known here; a behaviour has the connections that it needs, as <config "
+             "at=\"…\">…</config>";
     }
     const std::string_view better = advice_on_element(element.text, known);
     return in_brackets(element) + " is not known here" +

@@ -87,6 +87,12 @@ TEST(Application, SaysWhichEndOfAConnectionIsMisspelt) {
                   "<connection><From>/a</From><TO>/b</TO></connection></application>");
   EXPECT_THAT(capital.message(0), HasSubstr("lacks <from>; did you mean it where it has <From>?"));
   EXPECT_THAT(capital.message(1), HasSubstr("lacks <to>; did you mean it where it has <TO>?"));
+  const auto attribute =
+      load_with_application(kModel, "<application>" + connection("/s", "/p") +
+                                        "<connection from='/a' to='/b'/></application>");
+  EXPECT_THAT(attribute.message(0),
+              HasSubstr("lacks <from>; it is no attribute: write <from>…</from>"));
+  EXPECT_THAT(attribute.message(1), HasSubstr("lacks <to>; it is no attribute: write <to>…</to>"));
 }
 
 TEST(Application, MayCallTheEndsOfAConnectionOutputAndInputAsYarpDoes) {

@@ -59,6 +59,12 @@ std::set<std::string> warnings_in(const std::string& text) {
   return result;
 }
 
+// The same of behaviours: /a and /b, which nothing keeps apart but what is in "A".
+std::string behaviours_at(const std::string& port, const std::string& in_a) {
+  return "<behavior name='A'" + in_a + "><config at='" + port + "'>/a</config></behavior>" +
+         "<behavior name='B'><config at='" + port + "'>/b</config></behavior>";
+}
+
 // Two connections that can both win.
 std::string conflict_at(const std::string& port) {
   return "<arbiter at='" + port + "'><select from='/a'/><select from='/b'/></arbiter>";
@@ -69,6 +75,17 @@ TEST(Doubt, ATimeoutThatCannotBeReadHidesNoConflict) {
               ElementsAre("invalid-timeout", "both-can-win /p"));
   EXPECT_THAT(errors_in("<behaviors timeout='0s'>" + conflict_at("/p") + "</behaviors>"),
               ElementsAre("invalid-timeout", "both-can-win /p"));
+}
+
+TEST(Doubt, WhatWasWrittenAsAnAttributeIsMissedAsAnElementWouldBe) {
+  for (const char* attribute : {" inhibits='B'", " inhibition='B'"}) {
+    EXPECT_THAT(errors_in(behaviours_at("/p", attribute) + conflict_at("/q")),
+                ElementsAre("unknown-attribute", "both-can-win /q"));
+  }
+  EXPECT_THAT(errors_in(behaviours_at("/p", " condition='not /b'") + conflict_at("/q")),
+              ElementsAre("unknown-attribute", "both-can-win /q"));
+  EXPECT_THAT(errors_in(behaviours_at("/p", " timeout='1s'")),
+              ElementsAre("unknown-attribute", "both-can-win /p"));
 }
 
 TEST(Doubt, AConditionThatCannotBeReadHidesConflictsAtItsOwnPortsOnly) {
