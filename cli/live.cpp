@@ -76,8 +76,10 @@ std::shared_ptr<watch::Instance> watch_instance(const std::string& verb,
 
 std::shared_ptr<watch::Instance> follow_instance(const std::string& verb,
                                                  const std::string& instance,
-                                                 std::chrono::milliseconds most) {
+                                                 std::chrono::milliseconds most,
+                                                 std::chrono::milliseconds patience) {
   wire::Caller follower = caller(verb, instance);
+  follower.patience = patience;
   follower.answer_time = most;
   return std::make_shared<watch::Instance>(std::move(follower));
 }

@@ -43,9 +43,10 @@ std::shared_ptr<watch::Instance> watch_instance(const std::string& verb,
 // The same for a verb that goes on until it is interrupted: a question holds it up for a second at
 // most, or for less, for meanwhile it does not hear Ctrl-C.
 inline constexpr std::chrono::milliseconds kMostHeldUp{1000};
-std::shared_ptr<watch::Instance> follow_instance(const std::string& verb,
-                                                 const std::string& instance,
-                                                 std::chrono::milliseconds most = kMostHeldUp);
+std::shared_ptr<watch::Instance> follow_instance(
+    const std::string& verb, const std::string& instance,
+    std::chrono::milliseconds most = kMostHeldUp,
+    std::chrono::milliseconds patience = kConnectTimeout);
 
 // Says on standard error that the daemon has gone, and that one is there again.
 class DaemonNews {

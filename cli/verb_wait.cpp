@@ -61,6 +61,14 @@ std::chrono::milliseconds time_to_answer(const WaitOptions& options, shm::Nanose
                     kMostHeldUp);
 }
 
+// How long one is looked for at a time: not beyond the end either.
+std::chrono::milliseconds time_to_look(const WaitOptions& options, shm::Nanoseconds deadline) {
+  if (!options.timeout || *options.timeout == 0) return kConnectTimeout;
+  const std::chrono::nanoseconds left(deadline - shm::monotonic_now());
+  return std::clamp(std::chrono::ceil<std::chrono::milliseconds>(left),
+                    std::chrono::milliseconds(1), kConnectTimeout);
+}
+
 // The instance; with --timeout, one whose daemon comes in time. Null: interrupted meanwhile.
 std::shared_ptr<watch::Instance> find_instance(const WaitOptions& options,
                                                shm::Nanoseconds deadline,
@@ -68,7 +76,8 @@ std::shared_ptr<watch::Instance> find_instance(const WaitOptions& options,
   constexpr shm::Nanoseconds kLookAgain = 50'000'000;
   for (bool has_said = false;;) {
     try {
-      return follow_instance("wait", options.instance, time_to_answer(options, deadline));
+      return follow_instance("wait", options.instance, time_to_answer(options, deadline),
+                             time_to_look(options, deadline));
     } catch (const wire::RefusedError&) {
       throw;
     } catch (const wire::CallError& error) {

@@ -254,7 +254,7 @@ TEST(Wait, WithoutADaemonOrWithAConditionThatCannotBeReadIsAnError) {
   EXPECT_EQ(result.exit_code, 1);
   EXPECT_THAT(result.err,
               HasSubstr("arbiter: timed out after 0.001 s; at the last try: no arbiterd "
-                        "of instance"));
+                        "of instance \"nobody-has-this-instance\" answered within 1 ms "));
 }
 
 }  // namespace
