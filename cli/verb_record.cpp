@@ -248,8 +248,8 @@ void add_record(CLI::App& app, int& exit_code) {
           [options](const std::string& text) {
             options->period = read_time_within("--period", text, 100'000, 1'000'000'000);
           },
-          "How often taps are read (default 1ms): what happened closer together than this may be "
-          "of unknown order")
+          "How often taps are read, 100us to 1s (default 1ms): what happened closer together than "
+          "this may be of unknown order")
       ->type_name("DURATION");
   add_flight_options(*verb, options);
   add_instance_option(*verb, options->instance);
