@@ -14,7 +14,6 @@
 
 #include "gateway/core/freshness.hpp"
 #include "gateway/core/say.hpp"
-#include "gateway/iceoryx/chunk.hpp"
 #include "gateway/iceoryx/runtime.hpp"
 #include "shm/clock.hpp"
 
@@ -38,13 +37,6 @@ constexpr shm::Nanoseconds kGivenUp = 1200 * kMillisecond;
 
 thread_local std::string made;
 
-iox::capro::ServiceDescription service_of(const IceoryxTopic& topic) {
-  const auto id = [](const std::string& text) {
-    return iox::capro::IdString_t(iox::cxx::TruncateToCapacity, text);
-  };
-  return {id(topic.service), id(topic.instance), id(topic.event)};
-}
-
 // A status has room for a few, and so has a log that is to be read.
 std::string some_of(const std::vector<std::string>& names) {
   std::string text;
@@ -67,23 +59,6 @@ std::uint32_t alignment_of_header(std::uint32_t size) {
 }
 
 }  // namespace
-
-// An `in` entry, and what is known of its queue. The session's thread.
-struct Session::Inlet {
-  Inlet(const Middleware::OpenIn& open, const iox::popo::SubscriberOptions& options)
-      : in(open),
-        topic(*open.incoming.entry().iceoryx),
-        subscriber(service_of(topic), options),
-        freshness(topic.queue) {}
-
-  const Middleware::OpenIn in;
-  const IceoryxTopic& topic;
-  iox::popo::UntypedSubscriber subscriber;
-  QueueFreshness freshness;
-  std::uint32_t last_header = 0;  // of a chunk that was passed over
-  std::size_t last_size = 0;
-  bool has_overflown = false;
-};
 
 Sender::Result ChunkSender::send(Bytes sample) noexcept {
   Publisher* const to = publisher();
@@ -216,15 +191,11 @@ void Session::make_refused(shm::Nanoseconds now) {
 }
 
 void Session::make_inlet(const Middleware::OpenIn& in) {
-  const Entry& entry = in.incoming.entry();
-  made = "the subscriber of " + entry.outside();
-  iox::popo::SubscriberOptions options;
-  options.queueCapacity = entry.iceoryx->queue;
-  options.historyRequest = 0;  // nothing old
-  inlets_.push_back(std::make_unique<Inlet>(in, options));
+  made = "the subscriber of " + in.incoming.entry().outside();
+  inlets_.push_back(std::make_unique<Inlet>(in));
   watches_all_ =
       watches_all_ && wait_set_->size() < wait_set_->capacity() &&
-      !wait_set_->attachState(inlets_.back()->subscriber, iox::popo::SubscriberState::HAS_DATA)
+      !wait_set_->attachState(inlets_.back()->subscriber(), iox::popo::SubscriberState::HAS_DATA)
            .has_error();
 }
 
@@ -244,18 +215,18 @@ void Session::make_added() {
   }
   for (const Middleware::OpenIn& in : added) {
     make_inlet(in);
-    take_all(*inlets_.back());  // from here on it is known to be empty
-    count_publishers(*inlets_.back());
+    inlets_.back()->take_all();  // from here on it is known to be empty
+    inlets_.back()->count_publishers(*port_list_);
   }
   made.clear();
 }
 
 void Session::take_for_ever() {
-  for (const auto& inlet : inlets_) take_all(*inlet);  // from here on they are known to be empty
+  for (const auto& inlet : inlets_) inlet->take_all();  // from here on they are known to be empty
   while (!ends_.load(std::memory_order_relaxed)) {
     shm::Nanoseconds wait = watches_all_ ? kLongestWait : kUnwatchedPeriod;
     for (const auto& inlet : inlets_) {
-      const shm::Nanoseconds age = inlet->in.incoming.max_age().get();
+      const shm::Nanoseconds age = inlet->max_age();
       wait = std::min(wait, std::max(kMillisecond, QueueFreshness::period(age)));
     }
     const auto woken = wait_set_->timedWait(
@@ -265,49 +236,9 @@ void Session::take_for_ever() {
     const shm::Nanoseconds before = last_round_.exchange(now, std::memory_order_relaxed);
     if (now - before > kGivenUp) stalled_.store(true, std::memory_order_relaxed);
     make_added();
-    for (const auto& inlet : inlets_) take_all(*inlet);
+    for (const auto& inlet : inlets_) inlet->take_all();
     look_at_list(now);
     make_refused(now);
-  }
-}
-
-void Session::take_all(Inlet& inlet) {
-  // A publisher that never rests must not keep others waiting.
-  for (std::uint32_t i = 0; i <= inlet.topic.queue; ++i) {
-    const shm::Nanoseconds before = shm::monotonic_now();
-    auto taken = inlet.subscriber.take();
-    if (taken.has_error()) {
-      inlet.freshness.note_empty(before);
-      break;
-    }
-    inlet.freshness.note_taken(before);
-    const void* const payload = taken.value();
-    const Chunk chunk(payload, inlet.topic);
-    Account& account = inlet.in.account;
-    if (!chunk.has_right_header()) {
-      inlet.in.incoming.fail();
-      if (std::exchange(inlet.last_header, chunk.header_size() + 1) != chunk.header_size() + 1) {
-        account.set_last_reason(
-            "chunks have a user header of " + std::to_string(chunk.header_size()) +
-            " bytes; write user_header=\"" + std::to_string(chunk.header_size()) +
-            "\", also where <out> sends them on");
-      }
-    } else {
-      const auto age = inlet.in.incoming.max_age().get();
-      const Time deadline{std::chrono::nanoseconds(inlet.freshness.deadline(age))};
-      const auto fate = inlet.in.incoming.deliver(chunk, deadline);
-      if (fate == Incoming::Fate::kTooLarge &&
-          std::exchange(inlet.last_size, chunk.size()) != chunk.size()) {
-        account.set_last_reason(does_not_fit(inlet.in.incoming.entry(), chunk.size()));
-      }
-    }
-    inlet.subscriber.release(payload);
-  }
-  if (inlet.subscriber.hasMissedData()) {
-    inlet.in.account.overflows.add();
-    if (!std::exchange(inlet.has_overflown, true)) {
-      inlet.in.account.set_last_reason("its queue has lost samples; write a larger queue=");
-    }
   }
 }
 
@@ -316,7 +247,7 @@ void Session::look_at_list(shm::Nanoseconds now) {
   looked_at_list_ = now;
   if (port_list_->hears_roudi()) heard_roudi_.store(now, std::memory_order_relaxed);
   if (port_list_->update()) {
-    for (const auto& inlet : inlets_) count_publishers(*inlet);
+    for (const auto& inlet : inlets_) inlet->count_publishers(*port_list_);
   }
   // Even if the list is the same: a process that has ended stays in it for a while.
   for (Outlet& out : outs_) {
@@ -324,11 +255,6 @@ void Session::look_at_list(shm::Nanoseconds now) {
     look_for_refused(out);
     tell_fault(out);
   }
-}
-
-void Session::count_publishers(const Inlet& inlet) const {
-  const std::size_t publishers = port_list_->publishers_of(inlet.topic).size();
-  inlet.in.account.set_peers(static_cast<std::uint32_t>(publishers));
 }
 
 // RouDi connects no subscriber that asks for what its publisher does not offer, and tells neither.

@@ -15,12 +15,12 @@
 #include <utility>
 #include <vector>
 
-#include <iceoryx_posh/popo/untyped_subscriber.hpp>
 #include <iceoryx_posh/popo/wait_set.hpp>
 
 #include "gateway/core/announced.hpp"
 #include "gateway/core/middleware.hpp"
 #include "gateway/core/pauses.hpp"
+#include "gateway/iceoryx/inlet.hpp"
 #include "gateway/iceoryx/port_list.hpp"
 #include "gateway/iceoryx/publisher.hpp"
 #include "gateway/iceoryx/roudi.hpp"
@@ -107,7 +107,6 @@ class Session {
   }
 
  private:
-  struct Inlet;
   // An `out` entry, who else writes to its topic, and who subscribes to it in vain.
   struct Outlet {
     ChunkSender* sender;
@@ -124,10 +123,8 @@ class Session {
   void make_refused(shm::Nanoseconds now);
   void make_inlet(const Middleware::OpenIn& in);
   void make_added();
-  void take_all(Inlet& inlet);
   void take_for_ever();
   void look_at_list(shm::Nanoseconds now);
-  void count_publishers(const Inlet& inlet) const;
   void look_for_strangers(Outlet& out, shm::Nanoseconds now) const;
   void look_for_refused(Outlet& out) const;
   static void tell_fault(const Outlet& out);
