@@ -191,6 +191,14 @@ std::vector<Series> series_of(const evidence::Comparison& result, bool folds) {
 }
 
 void write_changed(const Recorded& recorded, const evidence::Comparison& result, bool each) {
+// Nothing where a publisher has begun to count anew.
+std::string numbers_text(const Series& series) {
+  const evidence::LiveDecision &first = series.first->live, &last = series.last->live;
+  const std::uint64_t begin = first.decision->sequence, end = last.decision->sequence;
+  if (end <= begin || end - begin + 1 < series.count) return "";
+  return " (" + arrival_text(first) + " to " + arrival_text(last) + ")";
+}
+
   if (result.changed.empty()) return;
   std::cout << "these decisions change:\n";
   for (const Series& series : series_of(result, !each)) {
@@ -204,8 +212,8 @@ void write_changed(const Recorded& recorded, const evidence::Comparison& result,
     } else {
       std::cout << " to " << time(series.last) << "  "
                 << shm::printable(live.decision->context->source) << ", "
-                << rules::counted(series.count, "arrival") << " (" << arrival_text(live) << " to "
-                << arrival_text(series.last->live) << ") at " << shm::printable(*live.port) << ": ";
+                << rules::counted(series.count, "arrival") << numbers_text(series) << " at "
+                << shm::printable(*live.port) << ": ";
     }
     std::cout << outcome(!live.won) << " instead of " << outcome(live.won)
               << (series.first->is_connected ? "" : " (not connected)") << '\n';

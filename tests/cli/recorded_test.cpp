@@ -5,10 +5,12 @@
 
 #include <chrono>
 #include <string>
+#include <variant>
 
 #include <arbiter/arbiter.hpp>
 
 #include "evidence/record_writer.hpp"
+#include "tests/evidence/incident.hpp"
 #include "tests/recorder/recording.hpp"
 
 namespace arbiter::test {
@@ -47,6 +49,24 @@ TEST(RecordedIncident, HasNothingToCompareWhereNothingArrived) {
   const auto result = simulated(file);
   EXPECT_EQ(result.exit_code, 1);
   EXPECT_THAT(result.out, HasSubstr("nothing to compare: nothing arrived while it was recorded\n"));
+}
+
+TEST(RecordedIncident, HasNoNumbersWherePublishersBeganToCountAnew) {
+  Incident incident;
+  incident.arrive("/high", 1100, 1101, Incident::Fate::accepted);
+  for (int i = 0; i < 3; ++i) incident.arrive("/low", 1200 + i, 1203, Incident::Fate::discarded);
+  const TemporaryDirectory directory;
+  const std::string file = directory.path() + "/restarts.mcap";
+  evidence::RecordWriter writer(file, {}, {"program", "test", "host", "command", 5'000'000});
+  for (evidence::Record record : incident.records()) {
+    auto* const arrival = std::get_if<evidence::Arrival>(&record);
+    if (arrival != nullptr && arrival->context->source == "/low") arrival->sequence = 1;
+    writer.write(record);
+  }
+  writer.close(0);
+  const auto other = directory.write("other.xml", kReversed);
+  const auto result = arbiter({"simulate", "--recording", file, "--model", other}).out;
+  EXPECT_THAT(result, HasSubstr("  /low, 3 arrivals at /p: delivered instead of discarded\n"));
 }
 
 TEST(ReplayOfNothing, SaysWhatTheRecordingHas) {
