@@ -1,9 +1,11 @@
 #include "evidence/record_reader.hpp"
 
+#include <algorithm>
 #include <charconv>
 #include <map>
 #include <string_view>
 #include <utility>
+#include <vector>
 
 #include "evidence/record_json.hpp"
 #include "evidence/record_schemas.hpp"
@@ -11,10 +13,67 @@
 namespace arbiter::evidence {
 namespace {
 
+// An event as the file has it.
+struct PassedEvent {
+  RecordKind kind{};
+  std::uint64_t number = 0;  // of all records; 0: none
+  std::string text;
+};
+
+// The source of an event, as JSON writes it; nothing: it does not stand where RecordWriter has it.
+std::optional<std::string_view> quoted_source(std::string_view text) {
+  constexpr std::string_view kBefore = R"({"source":")";
+  if (!text.starts_with(kBefore)) return std::nullopt;
+  text.remove_prefix(kBefore.size());
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    if (text[i] == '"') return text.substr(0, i);
+    if (text[i] == '\\') ++i;
+  }
+  return std::nullopt;
+}
+
+// Those that were passed over and may have to be handed on: to read them takes twenty times as
+// long.
+class PassedEvents {
+ public:
+  // In place of an earlier one of that source.
+  void put(std::string_view source, RecordKind kind, std::uint64_t number, std::string_view text) {
+    auto found = of_sources_.find(source);
+    if (found == of_sources_.end()) found = of_sources_.emplace(source, PassedEvent{}).first;
+    found->second = {kind, number, std::string(text)};
+  }
+  // In place of whatever was the last.
+  void put_last(RecordKind kind, std::uint64_t number, std::string_view text) {
+    last_.kind = kind;
+    last_.number = number;
+    last_.text = text;
+  }
+  // Those of sources, in the order in which they stand in the file.
+  [[nodiscard]] std::vector<PassedEvent> take() {
+    std::vector<PassedEvent> all;
+    for (auto& [source, event] : of_sources_) all.push_back(std::move(event));
+    of_sources_.clear();
+    std::sort(all.begin(), all.end(),
+              [](const auto& one, const auto& other) { return one.number < other.number; });
+    return all;
+  }
+  [[nodiscard]] PassedEvent take_last() { return std::exchange(last_, {}); }
+
+ private:
+  std::map<std::string, PassedEvent, std::less<>> of_sources_;
+  PassedEvent last_;
+};
+
+// Whether what it says of a source may rest on the events before it.
+bool rests_on_events(RecordKind kind) {
+  return kind != RecordKind::kWinner && kind != RecordKind::kPort && kind != RecordKind::kModel;
+}
+
 class Reading {
  public:
-  Reading(const std::string& path, Payloads payloads, const std::function<void(Record&&)>& use)
-      : path_(path), payloads_(payloads), use_(use) {}
+  Reading(const std::string& path, Payloads payloads, const std::function<void(Record&&)>& use,
+          const TimeSpan& events)
+      : path_(path), payloads_(payloads), use_(use), events_(events) {}
 
   ReadRecording run(const recording::Watch& watch) {
     recording::McapVisitor visitor;
@@ -28,6 +87,7 @@ class Reading {
     };
     result_.end = recording::read_mcap(path_, visitor);
     hand_on_passed();
+    hand_on_last();
     hand_on();
     if (!has_metadata_) refuse();
     return std::move(result_);
@@ -99,14 +159,23 @@ class Reading {
     const bool is_event =
         kind->second == RecordKind::kArrival || kind->second == RecordKind::kDeactivation;
     ++result_.records;
-    if (is_event && payloads_ == Payloads::pass_over_with_events) {
-      passed_kind_ = kind->second;
-      passed_number_ = result_.records;
-      passed_ = text;
-      return;
-    }
-    hand_on_passed();
+    if (is_event && pass_over(kind->second, message, text)) return;
+    if (rests_on_events(kind->second)) hand_on_passed();
+    hand_on_last();
     read(kind->second, text, result_.records);
+  }
+
+  bool pass_over(RecordKind kind, const recording::McapMessage& message, std::string_view text) {
+    const auto time = static_cast<Nanoseconds>(message.log_time -
+                                               static_cast<std::uint64_t>(result_.wall_offset));
+    if (events_.has(time)) return false;
+    if (time >= events_.to) {
+      passed_.put_last(kind, result_.records, text);
+      return true;
+    }
+    const auto source = quoted_source(text);
+    if (source) passed_.put(*source, kind, result_.records, text);
+    return source.has_value();
   }
 
   void read(RecordKind kind, std::string_view text, std::uint64_t number) {
@@ -121,7 +190,11 @@ class Reading {
   }
 
   void hand_on_passed() {
-    if (!passed_.empty()) read(passed_kind_, std::exchange(passed_, ""), passed_number_);
+    for (const PassedEvent& each : passed_.take()) read(each.kind, each.text, each.number);
+  }
+  void hand_on_last() {
+    const PassedEvent last = passed_.take_last();
+    if (last.number != 0) read(last.kind, last.text, last.number);
   }
 
   // It stands directly behind its arrival.
@@ -151,17 +224,16 @@ class Reading {
   std::map<std::uint16_t, std::string> payloads_of_;
   Contexts contexts_;
   std::optional<Record> waiting_;
-  RecordKind passed_kind_{};
-  std::uint64_t passed_number_ = 0;
-  std::string passed_;  // the last event that was passed over; empty: none
+  const TimeSpan events_;
+  PassedEvents passed_;
 };
 
 }  // namespace
 
 ReadRecording read_recording(const std::string& path, Payloads payloads,
                              const std::function<void(Record&&)>& use,
-                             const recording::Watch& watch) {
-  return Reading(path, payloads, use).run(watch);
+                             const recording::Watch& watch, const TimeSpan& events) {
+  return Reading(path, payloads, use, events).run(watch);
 }
 
 }  // namespace arbiter::evidence

@@ -22,14 +22,14 @@ struct ReadRecording {
   recording::McapEnd end;  // a file that was cut short is read up to its last whole chunk
 };
 
-// pass_over_with_events: of arrivals and deactivations that stand one behind another, only the last
-// is handed on, which tells how far the recording goes.
-enum class Payloads : std::uint8_t { pass_over, read, pass_over_with_events };
+enum class Payloads : std::uint8_t { pass_over, read };
 
 // Calls `use` for each record, in the file's order, which for those of one source is the order in
-// which they happened. Throws McapError, RecordError.
+// which they happened. Of arrivals and deactivations outside `events`, which are passed over faster
+// than others are read: before it, the last of each source that stands in front of what may rest on
+// it; behind it, the last of those that stand one behind another. Throws McapError, RecordError.
 ReadRecording read_recording(const std::string& path, Payloads payloads,
                              const std::function<void(Record&&)>& use,
-                             const recording::Watch& watch = {});
+                             const recording::Watch& watch = {}, const TimeSpan& events = {});
 
 }  // namespace arbiter::evidence

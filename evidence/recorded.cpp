@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cstdint>
-#include <set>
 #include <string>
 #include <utility>
 
@@ -11,20 +10,26 @@
 namespace arbiter::evidence {
 namespace {
 
-// A decision rests on what sources did until it was seen. It is seen so long after its arrival at
-// most; of one that is seen later, it is not known what it rests on.
+// A decision rests on what sources did until it was seen, and what they did is seen so long after
+// it at most. What is seen later is taken for unknown.
 constexpr Nanoseconds kSeenWithin = 10'000'000'000;
+
+Nanoseconds later(Nanoseconds time) {
+  return time < shm::kForever - kSeenWithin ? time + kSeenWithin : shm::kForever;
+}
 
 class Loader {
  public:
-  explicit Loader(const TimeSpan& part)
-      : part_(part),
-        known_until_(part.to < shm::kForever - kSeenWithin ? part.to + kSeenWithin
-                                                           : shm::kForever) {}
+  explicit Loader(const TimeSpan& part) : part_(part), known_until_(later(part.to)) {}
+
+  // What is read for it.
+  [[nodiscard]] TimeSpan events() const {
+    return {std::max(part_.from - kSeenWithin, Nanoseconds{0}), known_until_};
+  }
 
   void take(Record&& record) {
     if (const auto* start = std::get_if<Start>(&record)) {
-      if (start->time <= part_.from) forget();
+      if (start->time <= part_.from) runs_.clear();
       runs_.emplace_back();
       runs_.back().start = runs_.back().end = start->time;
       runs_.back().ports = start->ports;
@@ -36,9 +41,6 @@ class Loader {
 
   // `until`: when recording ended, if that is known.
   std::vector<Run> finish(Nanoseconds until) {
-    for (SourceHistory* const each : beyond_) {
-      each->unknown_from = std::min(each->unknown_from, known_until_);
-    }
     if (!runs_.empty()) run().end = std::max(run().end, until);
     for (std::size_t i = 1; i < runs_.size(); ++i) leave_out_strangers(runs_[i - 1], runs_[i]);
     const auto by_time = [](const Decision& one, const Decision& other) {
@@ -57,20 +59,14 @@ class Loader {
  private:
   Run& run() { return runs_.back(); }
 
-  [[nodiscard]] bool is_in_part(Nanoseconds time) const {
-    return time >= part_.from && time < part_.to;
-  }
   [[nodiscard]] bool is_before(const Run& run) const { return run.end < part_.from; }
-  // What was before the part begins.
-  void forget() {
-    beyond_.clear();
-    runs_.clear();
-  }
-
   // To the part. What sources did before it is a state of each as it begins.
   void cut(Run& run) const {
     run.end = std::min(run.end, part_.to);
     run.until = part_.to;
+    for (auto& [source, history] : run.sources) {
+      history.unknown_from = std::min(history.unknown_from, known_until_);
+    }
     if (run.start >= part_.from || is_before(run)) return;
     run.start = part_.from;
     for (auto& [source, history] : run.sources) {
@@ -105,8 +101,7 @@ class Loader {
       step.seen = std::max(step.seen, history.steps.back().seen);
     }
     run().end = std::max(run().end, step.seen);
-    if (step.time >= known_until_) beyond_.insert(&history);
-    if (beyond_.contains(&history)) return nullptr;
+    if (step.time >= known_until_) return nullptr;
     if (step.seen < part_.from) history.steps.clear();
     history.steps.push_back(step);
     return &history;
@@ -118,7 +113,7 @@ class Loader {
                  {each.time, each.seen, each.word, Step::Kind::arrival, false, 0, each.generation});
     if (history == nullptr) return;
     history->word = each.word;
-    if (!is_in_part(each.time)) return;
+    if (!part_.has(each.time)) return;
     const auto step = static_cast<std::uint32_t>(history->steps.size() - 1);
     run().decisions.push_back(
         {history, step, each.is_sample, std::move(each.context), each.sequence, each.masks});
@@ -135,7 +130,7 @@ class Loader {
   // one write (shm/activity.hpp).
   void add(SourceState&& each) {
     SourceHistory& history = run().sources[each.context->source];
-    if (is_in_part(each.seen)) run().lost += each.lost;
+    if (part_.has(each.seen)) run().lost += each.lost;
     run().end = std::max(run().end, each.seen);
     const bool is_known = !history.steps.empty() && history.word == each.word;
     // It is tapped now; the step below stands behind the gap.
@@ -192,8 +187,6 @@ class Loader {
 
   const TimeSpan part_;
   const Nanoseconds known_until_;
-  // Those that have done something since then.
-  std::set<SourceHistory*> beyond_;
   std::vector<Run> runs_;
 };
 
@@ -221,9 +214,8 @@ Recorded load_recording(const std::string& path, const recording::Watch& watch, 
   Recorded recorded;
   Loader loader(part);
   const auto use = [&](Record&& record) { loader.take(std::move(record)); };
-  const auto payloads =
-      wanted == Wanted::winners ? Payloads::pass_over_with_events : Payloads::pass_over;
-  recorded.about = read_recording(path, payloads, use, watch);
+  const TimeSpan events = wanted == Wanted::winners ? TimeSpan{0, 0} : loader.events();
+  recorded.about = read_recording(path, Payloads::pass_over, use, watch, events);
   recorded.runs = loader.finish(recorded.about.recorded_until);
   return recorded;
 }

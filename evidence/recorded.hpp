@@ -85,15 +85,9 @@ struct Recorded {
 // What a recording is read for.
 enum class Wanted : std::uint8_t { all, winners };  // winners: without most steps and decisions
 
-// From one moment to before another, by the recording's clock.
-struct TimeSpan {
-  Nanoseconds from = 0;
-  Nanoseconds to = shm::kForever;
-};
-
-// Of a part: the arrivals in it, what sources did in it, and a state of each source for what it did
-// before. A decision in it rests on the same as in the whole recording. Runs that lie outside are
-// left out. Throws McapError, RecordError.
+// Of a part, by the recording's clock: the arrivals in it, what sources did in it, and a state of
+// each source for what it did before. A decision in it rests on the same as in the whole recording.
+// Runs that lie outside are left out. Throws McapError, RecordError.
 [[nodiscard]] Recorded load_recording(const std::string& path, const recording::Watch& watch = {},
                                       Wanted wanted = Wanted::all, const TimeSpan& part = {});
 

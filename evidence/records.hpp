@@ -24,6 +24,14 @@ namespace arbiter::evidence {
 using shm::ActivityWord;
 using shm::Nanoseconds;
 
+// From one moment to before another.
+struct TimeSpan {
+  Nanoseconds from = 0;
+  Nanoseconds to = shm::kForever;
+
+  [[nodiscard]] bool has(Nanoseconds time) const { return time >= from && time < to; }
+};
+
 // What the records of a source have in common until its destinations change.
 struct SourceContext {
   std::string source;

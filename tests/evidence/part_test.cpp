@@ -27,26 +27,33 @@ Recorded read_part(Incident& incident, TimeSpan part) {
   return evidence::load_recording(incident.file(), {}, evidence::Wanted::all, part);
 }
 
-// Each source tells its steps in order, some of them late; models come, events are missing, and the
-// recording begins again.
+constexpr shm::Nanoseconds kMs = 1'000'000;
+
+std::string slowed(std::string model) { return model.replace(model.find("500ns"), 5, "25s"); }
+constexpr shm::Nanoseconds kT = 25'000 * kMs;
+
+// Each source tells its steps in order, some of them late, by at most 6 s; models come, events are
+// missing, and the recording begins again.
 void fill(Incident& incident, std::mt19937& random, shm::Nanoseconds until) {
   const auto below = [&](unsigned most) { return static_cast<shm::Nanoseconds>(random() % most); };
+  const auto some = [&](unsigned most) { return below(most) * 50 * kMs; };
   std::uint64_t generation = 1;
   shm::Nanoseconds time = 1000;
   while (time < until) {
-    time += 1 + below(60);
+    time += 1 + some(60);
     const std::string source = below(2) == 0 ? "/low" : "/high";
-    const shm::Nanoseconds seen = time + below(4) * below(40);
+    const shm::Nanoseconds seen = time + some(120);
     switch (below(24)) {
       case 0:
         incident.deactivate(source, time, seen);
         break;
       case 1:
-        incident.state(source, time, seen, shm::arrival(time, 500), evidence::SourceState::Why::gap,
+        incident.state(source, time, seen, shm::arrival(time, kT), evidence::SourceState::Why::gap,
                        2);
         break;
       case 2:
-        incident.put_in_force(generation % 2 == 0 ? kOverride : kReversed, generation + 1, time);
+        incident.put_in_force(slowed(generation % 2 == 0 ? kOverride : kReversed), generation + 1,
+                              time);
         ++generation;
         break;
       case 3:
@@ -54,10 +61,10 @@ void fill(Incident& incident, std::mt19937& random, shm::Nanoseconds until) {
         for (const char* const each : {"/low", "/high"}) {
           incident.state(each, 0, time, shm::kNeverActive);
         }
-        incident.put_in_force(kOverride, generation, time);
+        incident.put_in_force(slowed(kOverride), generation, time);
         break;
       default:
-        incident.arrive(source, time, seen, below(2) == 0 ? Fate::accepted : Fate::discarded);
+        incident.arrive(source, time, seen, below(2) == 0 ? Fate::accepted : Fate::discarded, kT);
     }
   }
 }
@@ -87,10 +94,10 @@ TEST(PartOfARecording, HasTheSameOfEachDecisionAsTheWhole) {
   for (unsigned seed = 1; seed <= 20; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     std::mt19937 random(seed);
-    Incident incident;
-    fill(incident, random, 6000);
+    Incident incident(slowed(kOverride));
+    fill(incident, random, 250'000 * kMs);
     std::vector<shm::Nanoseconds> cuts{0, shm::kForever};
-    for (int i = 0; i < 3; ++i) cuts.push_back(900 + static_cast<int>(random() % 5200));
+    for (int i = 0; i < 3; ++i) cuts.push_back(static_cast<int>(random() % 260'000) * kMs);
     std::sort(cuts.begin(), cuts.end());
     Counts sum{};
     Names names;
@@ -122,9 +129,9 @@ TEST(PartOfARecording, HasTheSameRowsAsTheWhole) {
   for (unsigned seed = 1; seed <= 20; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     std::mt19937 random(seed);
-    Incident incident;
-    fill(incident, random, 4000);
-    const shm::Nanoseconds cut = 1100 + static_cast<int>(random() % 2500);
+    Incident incident(slowed(kOverride));
+    fill(incident, random, 150'000 * kMs);
+    const shm::Nanoseconds cut = static_cast<int>(random() % 150'000) * kMs;
     auto rows = decided_rows(read_part(incident, {0, cut}));
     rows.merge(decided_rows(read_part(incident, {cut, shm::kForever})));
     EXPECT_EQ(rows, decided_rows(incident.read()));
