@@ -11,11 +11,10 @@
 #include "cli/first_output.hpp"
 #include "cli/model_files.hpp"
 #include "cli/output_file.hpp"
-#include "cli/progress.hpp"
 #include "cli/recording_compile.hpp"
+#include "cli/recording_part.hpp"
 #include "cli/simulate_recording.hpp"
 #include "evidence/export.hpp"
-#include "shm/utf8.hpp"
 
 namespace arbiter::cli {
 namespace {
@@ -24,6 +23,7 @@ struct ExportOptions {
   std::string file;
   std::string trace;
   std::string csv;
+  PartOptions part;
   double effort = 1;
   bool replaces = false;
 };
@@ -46,13 +46,7 @@ int export_recording(const ExportOptions& options) {
   }
   require_new_file(options.trace, options.replaces);
   require_new_file(options.csv, options.replaces);
-  ProgressLine line;
-  const auto recorded = evidence::load_recording(options.file, line.watch("reading the recording"));
-  line.clear();
-  if (!recorded.about.end.is_whole) {
-    std::cerr << "arbiter: " << shm::printable(options.file) << ": " << recorded.about.end.problem
-              << "; what comes before is exported\n";
-  }
+  const auto recorded = load_for_simulation(options.file, options.part);
   warn_of_missed(recorded);
   evidence::Models models(recording_compiler(options.effort));
   const auto content_by = [&](const auto& writer) {
@@ -84,6 +78,7 @@ void add_export(CLI::App& parent, int& exit_code) {
   verb->add_option("--csv", options->csv,
                    "What was decided live, in the form that `arbiter simulate` prints")
       ->type_name("FILE");
+  add_part_options(*verb, options->part);
   add_effort_option(*verb, options->effort);
   add_force_option(*verb, options->replaces);
   verb->footer(

@@ -126,7 +126,7 @@ std::size_t with_sequence(const SampleOptions& options, const Found& found) {
 
 // The last that had come by then.
 std::size_t at_moment(const SampleOptions& options, const Found& found) {
-  const TimeSpan span = read_moment(options.at, found.begin, found.end, found.about.wall_offset);
+  const auto span = read_moment(options.at, {found.begin, found.end, found.about.wall_offset});
   for (std::size_t i = found.samples.size(); i-- != 0;) {
     if (found.samples[i].time < span.to) return i;
   }

@@ -14,6 +14,7 @@ namespace arbiter::cli {
 namespace {
 
 using evidence::Recorded;
+using evidence::TimeSpan;
 
 constexpr shm::Nanoseconds kWholeSecond = 1'000'000'000;
 
@@ -32,8 +33,9 @@ std::string exact_seconds(shm::Nanoseconds span) {
   return text;
 }
 
-[[noreturn]] void fail_at(const std::string& text, const std::string& why) {
-  throw CLI::ValidationError("--at", rules::quote(text) + ' ' + why);
+[[noreturn]] void refuse(const std::string& option, const std::string& text,
+                         const std::string& why) {
+  throw CLI::ValidationError(option, rules::quote(text) + ' ' + why);
 }
 
 // Of a second, in nanoseconds: ".25", or nothing.
@@ -63,14 +65,18 @@ std::string wall_text(const Recorded& recorded, shm::Nanoseconds time) {
   return text;
 }
 
-TimeSpan read_moment(const std::string& text, shm::Nanoseconds begin, shm::Nanoseconds end,
-                     shm::Nanoseconds wall_offset) {
-  begin += wall_offset;
-  end += wall_offset;
+RecordedTime time_of(const Recorded& recorded) {
+  return {recorded.runs.front().start, recorded.runs.back().end, recorded.about.wall_offset};
+}
+
+TimeSpan read_time(const std::string& option, const std::string& text,
+                   const RecordedTime& recorded) {
+  const shm::Nanoseconds wall_offset = recorded.wall_offset;
+  const std::time_t begin = (recorded.begin + wall_offset) / kWholeSecond;
+  const std::time_t end = (recorded.end + wall_offset) / kWholeSecond;
   for (const char* format : {"%Y-%m-%d %H:%M:%S", "%Y-%m-%dT%H:%M:%S", "%H:%M:%S"}) {
-    const std::time_t first = begin / kWholeSecond;
     std::tm parts{};
-    localtime_r(&first, &parts);
+    localtime_r(&begin, &parts);
     const char* const rest = strptime(text.c_str(), format, &parts);
     const auto fraction = rest == nullptr ? std::nullopt : fraction_of(rest);
     if (!fraction) continue;
@@ -78,19 +84,31 @@ TimeSpan read_moment(const std::string& text, shm::Nanoseconds begin, shm::Nanos
     std::tm day_after = parts;
     ++day_after.tm_mday;
     std::time_t second = std::mktime(&parts);
-    if (format[1] == 'H' && second + 1 <= begin / kWholeSecond) second = std::mktime(&day_after);
-    // No year is too far away to be counted in nanoseconds.
-    second = std::clamp(second, begin / kWholeSecond - 10, end / kWholeSecond + 10);
-    const shm::Nanoseconds wall = second * kWholeSecond;
-    const bool is_whole_second = *rest == '\0';
-    const TimeSpan span{wall + *fraction, wall + *fraction + (is_whole_second ? kWholeSecond : 1)};
-    if (span.to <= begin || span.from > end) {
-      fail_at(text, "is not in the recording, which is from " + clock_text(begin) + " to " +
-                        clock_text(end));
+    if (format[1] == 'H' && second + 1 <= begin) {
+      const std::time_t next = std::mktime(&day_after);
+      if (next <= end) second = next;
     }
-    return {span.from - wall_offset, span.to - wall_offset};
+    // No year is too far away to be counted in nanoseconds.
+    second = std::clamp(second, begin - 10, end + 10);
+    const shm::Nanoseconds from = second * kWholeSecond + *fraction - wall_offset;
+    return {from, from + (*rest == '\0' ? kWholeSecond : 1)};
   }
-  fail_at(text, "is not a time: write 14:03:07, 14:03:07.250 or 2026-11-22 14:03:07");
+  refuse(option, text, "is not a time: write 14:03:07, 14:03:07.250 or 2026-11-22 14:03:07");
+}
+
+void require_within(const std::string& option, const std::string& text, const TimeSpan& span,
+                    const RecordedTime& recorded) {
+  if (span.to > recorded.begin && span.from <= recorded.end) return;
+  refuse(option, text,
+         "is not in the recording, which is from " +
+             clock_text(recorded.begin + recorded.wall_offset) + " to " +
+             clock_text(recorded.end + recorded.wall_offset));
+}
+
+TimeSpan read_moment(const std::string& text, const RecordedTime& recorded) {
+  const TimeSpan span = read_time("--at", text, recorded);
+  require_within("--at", text, span, recorded);
+  return span;
 }
 
 std::string clock_text(shm::Nanoseconds wall) {

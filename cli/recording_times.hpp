@@ -13,17 +13,25 @@ namespace arbiter::cli {
 // "2026-11-22 14:02:41 UTC".
 [[nodiscard]] std::string wall_text(const evidence::Recorded& recorded, shm::Nanoseconds time);
 
-// From the first moment to before the second, by the clock of the recording.
-struct TimeSpan {
-  shm::Nanoseconds from = 0;
-  shm::Nanoseconds to = 0;
+// A recording's times, by its own clock, and how far they are from those of the wall clock.
+struct RecordedTime {
+  shm::Nanoseconds begin = 0;
+  shm::Nanoseconds end = 0;
+  shm::Nanoseconds wall_offset = 0;
 };
 
-// What was asked for with --at: a moment, or all of a second, by the wall clock in this time zone;
-// without a date, the first such time from `begin` on. `begin` and `end` are the recording's, by
-// its own clock. Throws CLI::ValidationError.
-[[nodiscard]] TimeSpan read_moment(const std::string& text, shm::Nanoseconds begin,
-                                   shm::Nanoseconds end, shm::Nanoseconds wall_offset);
+[[nodiscard]] RecordedTime time_of(const evidence::Recorded& recorded);
+
+// A moment, or all of a second, by the wall clock in this time zone, which was asked for with that
+// option. Without a date, the first such time in the recording, or on its first day. Throws
+// CLI::ValidationError.
+[[nodiscard]] evidence::TimeSpan read_time(const std::string& option, const std::string& text,
+                                           const RecordedTime& recorded);
+// Throws CLI::ValidationError.
+void require_within(const std::string& option, const std::string& text,
+                    const evidence::TimeSpan& span, const RecordedTime& recorded);
+// Both of --at.
+[[nodiscard]] evidence::TimeSpan read_moment(const std::string& text, const RecordedTime& recorded);
 
 // Of a time by the wall clock: "2026-11-22 15:02:41.250", in this time zone.
 [[nodiscard]] std::string clock_text(shm::Nanoseconds wall);

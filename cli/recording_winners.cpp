@@ -19,6 +19,7 @@
 #include "cli/live.hpp"
 #include "cli/port_patterns.hpp"
 #include "cli/recorded_components.hpp"
+#include "cli/recording_part.hpp"
 #include "cli/recording_times.hpp"
 #include "cli/simulate_recording.hpp"
 #include "evidence/recorded.hpp"
@@ -38,6 +39,7 @@ struct RecordedWinners {
   std::string file;
   std::string port;  // a pattern; empty: all
   std::string at;
+  PartOptions part;
   bool json = false;
 };
 
@@ -207,7 +209,10 @@ std::string length_text(const Reign& reign) {
 }
 
 std::string nobody_text(const RecordedWinners& options) {
-  return "nobody won" + (options.at.empty() ? "" : " at " + shm::printable(options.at)) + ", at " +
+  const std::string then = !options.at.empty()     ? " at " + shm::printable(options.at)
+                           : options.part.is_all() ? ""
+                                                   : " in that time";
+  return "nobody won" + then + ", at " +
          (options.port.empty()
               ? "any input port\n"
               : "an input port that matches " + shm::printable(options.port) + "\n");
@@ -295,17 +300,23 @@ void warn_of_gaps(const Recorded& recorded) {
             << (count == 1 ? " to " : " and ") << clock_text(to + offset) << '\n';
 }
 
+// Nothing: all of the recording.
+std::optional<evidence::TimeSpan> span_of(const RecordedWinners& options,
+                                          const RecordedTime& recorded) {
+  if (!options.at.empty()) return read_moment(options.at, recorded);
+  if (options.part.is_all()) return std::nullopt;
+  return read_part(options.part, recorded);
+}
+
 int show_winners(const RecordedWinners& options) {
-  Recorded recorded = load_for_simulation(options.file, evidence::Wanted::winners);
+  Recorded recorded = load_winners(options.file);
   cut_names(recorded);
   warn_of_gaps(recorded);
   if (!options.port.empty()) warn_of_pattern_without_match(recorded, options.port);
   std::vector<Reign> reigns = reigns_of(recorded, options.port);
-  if (!options.at.empty()) {
-    const TimeSpan span = read_moment(options.at, recorded.runs.front().start,
-                                      recorded.runs.back().end, recorded.about.wall_offset);
+  if (const auto span = span_of(options, time_of(recorded))) {
     std::erase_if(reigns, [&](const Reign& reign) {
-      return reign.change.time >= span.to || reign.end <= span.from;
+      return reign.change.time >= span->to || reign.end <= span->from;
     });
   }
   const shm::Nanoseconds offset = recorded.about.wall_offset;
@@ -325,10 +336,12 @@ void add_recorded_winners(CLI::App& parent, int& exit_code) {
   const auto options = std::make_shared<RecordedWinners>();
   CLI::App* verb = parent.add_subcommand("winners", "Show who commanded when, by the wall clock");
   verb->add_option("FILE", options->file, "A recording that `arbiter record` has made")->required();
-  verb->add_option("--at", options->at,
-                   "Only at this time of day, in your time zone (TZ): 14:03:07 (all of that "
-                   "second), 14:03:07.250, '2026-11-22 14:03:07'")
-      ->type_name("TIME");
+  auto* at =
+      verb->add_option("--at", options->at,
+                       "Only at this time of day, in your time zone (TZ): 14:03:07 (all of that "
+                       "second), 14:03:07.250, '2026-11-22 14:03:07'")
+          ->type_name("TIME");
+  for (auto* each : add_part_options(*verb, options->part)) each->excludes(at);
   verb->add_option("--port", options->port, "Only at input ports that match this pattern")
       ->type_name("PATTERN");
   verb->add_flag("--json", options->json,

@@ -30,6 +30,7 @@ namespace arbiter::cli {
 namespace {
 
 using evidence::Recorded;
+using evidence::TimeSpan;
 using nlohmann::ordered_json;
 
 std::string who(const std::string& winner) {
@@ -190,7 +191,6 @@ std::vector<Series> series_of(const evidence::Comparison& result, bool folds) {
   return all;
 }
 
-void write_changed(const Recorded& recorded, const evidence::Comparison& result, bool each) {
 // Nothing where a publisher has begun to count anew.
 std::string numbers_text(const Series& series) {
   const evidence::LiveDecision &first = series.first->live, &last = series.last->live;
@@ -199,6 +199,7 @@ std::string numbers_text(const Series& series) {
   return " (" + arrival_text(first) + " to " + arrival_text(last) + ")";
 }
 
+void write_changed(const Recorded& recorded, const evidence::Comparison& result, bool each) {
   if (result.changed.empty()) return;
   std::cout << "these decisions change:\n";
   for (const Series& series : series_of(result, !each)) {
@@ -261,6 +262,21 @@ void warn_of_other_ports(const Recorded& recorded, const evidence::Judge& judge)
             << shm::printable(rules::enumerate({ports.begin(), ports.end()})) << '\n';
 }
 
+Recorded load(const std::string& path, evidence::Wanted wanted, const TimeSpan& part) {
+  ProgressLine line;
+  Recorded recorded =
+      evidence::load_recording(path, line.watch("reading the recording"), wanted, part);
+  if (!recorded.runs.empty()) return recorded;
+  throw evidence::RecordError(
+      path + (part.from == 0 ? " is empty" : ": nothing was recorded in that time"));
+}
+
+void say_damage(const std::string& path, const Recorded& recorded) {
+  if (recorded.about.end.is_whole) return;
+  std::cerr << "arbiter: " << shm::printable(path) << ": "
+            << shm::printable(recorded.about.end.problem) << "; what comes before is used\n";
+}
+
 // A model that is compiled meanwhile has a line of its own.
 template <class Take>
 auto take_again(const Take& take) {
@@ -270,15 +286,19 @@ auto take_again(const Take& take) {
 
 }  // namespace
 
-Recorded load_for_simulation(const std::string& path, evidence::Wanted wanted) {
-  ProgressLine line;
-  Recorded recorded = evidence::load_recording(path, line.watch("reading the recording"), wanted);
-  line.clear();
-  if (!recorded.about.end.is_whole) {
-    std::cerr << "arbiter: " << shm::printable(path) << ": "
-              << shm::printable(recorded.about.end.problem) << "; what comes before is used\n";
-  }
-  if (recorded.runs.empty()) throw evidence::RecordError(path + " is empty");
+Recorded load_winners(const std::string& path) {
+  Recorded recorded = load(path, evidence::Wanted::winners, {});
+  say_damage(path, recorded);
+  return recorded;
+}
+
+// When it begins and ends, by which times of day are understood, only the whole file tells.
+Recorded load_for_simulation(const std::string& path, const PartOptions& part) {
+  Recorded recorded =
+      load(path, evidence::Wanted::all,
+           part.is_all() ? TimeSpan{}
+                         : read_part(part, time_of(load(path, evidence::Wanted::winners, {}))));
+  say_damage(path, recorded);
   return recorded;
 }
 
@@ -290,7 +310,7 @@ void warn_of_missed(const Recorded& recorded) {
 }
 
 int simulate_recording(const SimulateRecordingOptions& options) {
-  const Recorded recorded = load_for_simulation(options.recording);
+  const Recorded recorded = load_for_simulation(options.recording, options.part);
   evidence::Models models(recording_compiler(options.effort));
   if (options.other.models.empty()) {
     const auto result = take_again(

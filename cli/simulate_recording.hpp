@@ -3,6 +3,7 @@
 
 #include <string>
 
+#include "cli/recording_part.hpp"
 #include "evidence/recorded.hpp"
 #include "rules/model/load.hpp"
 
@@ -15,11 +16,14 @@ struct SimulateRecordingOptions {
   bool each = false;  // with another model: a line for each changed decision
   bool json = false;
   std::string at{};  // with --why: only at that time of day; empty: throughout
+  PartOptions part{};
 };
 
-// Says on standard error where it is not whole. Throws McapError, RecordError.
-evidence::Recorded load_for_simulation(const std::string& path,
-                                       evidence::Wanted wanted = evidence::Wanted::all);
+// All that is recorded, or the part of it. Says on standard error where the file is not whole.
+// Throws McapError, RecordError, CLI::ValidationError.
+evidence::Recorded load_for_simulation(const std::string& path, const PartOptions& part);
+// Without most of what is not about winners.
+evidence::Recorded load_winners(const std::string& path);
 
 // Says on standard error what the recorder missed, if it missed anything.
 void warn_of_missed(const evidence::Recorded& recorded);

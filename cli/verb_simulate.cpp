@@ -12,6 +12,7 @@
 
 #include "cli/model_files.hpp"
 #include "cli/progress.hpp"
+#include "cli/recording_part.hpp"
 #include "cli/simulate_recording.hpp"
 #include "cli/verbs.hpp"
 #include "cli/why_recorded.hpp"
@@ -30,6 +31,7 @@ struct SimulateOptions {
   std::string recording;
   std::string why;  // all_ports, or the port; empty: no
   std::string at;
+  PartOptions part;
   double effort = 1;
   bool each = false;
   bool json = false;
@@ -152,13 +154,15 @@ void add_simulate(CLI::App& app, int& exit_code) {
                              "Instead of the CSV, or of what is compared, show each change of a "
                              "winner and each discarded arrival, with its cause; --why=PORT: for "
                              "this port only");
-  verb->add_option("--at", options->at,
-                   "With --recording and --why: only at this time of day, and what led to it, in "
-                   "your time zone (TZ): 14:03:07 (all of that second), 14:03:07.250, "
-                   "'2026-11-22 14:03:07'")
-      ->type_name("TIME")
-      ->needs(recording)
-      ->needs(why);
+  auto* at = verb->add_option(
+                     "--at", options->at,
+                     "With --recording and --why: only at this time of day, and what led to it, in "
+                     "your time zone (TZ): 14:03:07 (all of that second), 14:03:07.250, "
+                     "'2026-11-22 14:03:07'")
+                 ->type_name("TIME")
+                 ->needs(recording)
+                 ->needs(why);
+  for (auto* each : add_part_options(*verb, options->part)) each->needs(recording)->excludes(at);
   add_effort_option(*verb, options->effort);
   verb->add_flag("--each", options->each,
                  "With --recording and a model: a line for each decision that changes, also where "
@@ -182,7 +186,8 @@ void add_simulate(CLI::App& app, int& exit_code) {
     require_no_port_among_files(*options);
     if (!options->recording.empty()) {
       const SimulateRecordingOptions simulated{options->recording, options->files, options->effort,
-                                               options->each,      options->json,  options->at};
+                                               options->each,      options->json,  options->at,
+                                               options->part};
       exit_code = options->why.empty() ? simulate_recording(simulated)
                                        : explain_recording(simulated, port_of(options->why));
       return;

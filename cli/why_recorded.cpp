@@ -168,7 +168,7 @@ class Explaining {
 }  // namespace
 
 int explain_recording(const SimulateRecordingOptions& options, const std::string& port) {
-  const auto recorded = load_for_simulation(options.recording);
+  const auto recorded = load_for_simulation(options.recording, options.part);
   warn_of_missed(recorded);
   std::shared_ptr<const Model> other;
   if (!options.other.models.empty()) {
@@ -188,9 +188,9 @@ int explain_recording(const SimulateRecordingOptions& options, const std::string
   told.time = [&](shm::Nanoseconds at) {
     return clock(at) + " (" + since_first(recorded, at) + ")";
   };
+  told.to = recorded.runs.back().until;
   if (!options.at.empty()) {
-    const TimeSpan span = read_moment(options.at, recorded.runs.front().start,
-                                      recorded.runs.back().end, recorded.about.wall_offset);
+    const auto span = read_moment(options.at, time_of(recorded));
     told.from = span.from;
     told.to = span.to;
   }

@@ -1,0 +1,154 @@
+// --from and --to: a part of a recording, by the time of day.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <string>
+#include <vector>
+
+#include "tests/cli/arbiter_program.hpp"
+#include "tests/evidence/incident.hpp"
+#include "tests/support/temporary_directory.hpp"
+
+namespace arbiter::test {
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::Not;
+
+constexpr shm::Nanoseconds kInSecond = 1'000'000'000;
+// So far is the wall clock ahead of a recording's times.
+constexpr shm::Nanoseconds kAhead = 5'000'000;
+
+std::string lasting(const std::string& model) {
+  std::string text = model;
+  return text.replace(text.find("500ns"), 5, "2s");
+}
+
+// From 00:00:00.005 on, for a minute. /high commands from 20 s to 30 s.
+class PartOfTheTools : public testing::Test {
+ protected:
+  PartOfTheTools() : incident_(lasting(kOverride)) {
+    using Why = evidence::WinnerChange::Why;
+    const auto win = [&](const char* winner, const char* before, int second, Why why,
+                         const char* by) {
+      incident_.add(evidence::WinnerChange{"/p", winner, before, at(second), why, by, 1});
+    };
+    win("/low", "", 1, Why::arrival, "/low");
+    for (int second = 1; second < 60; ++second) {
+      const bool is_inhibited = second >= 20 && second < 30;
+      if (is_inhibited) arrive("/high", second, Incident::Fate::accepted);
+      if (second == 20) win("/high", "/low", 20, Why::arrival, "/high");
+      if (second == 30) {
+        incident_.deactivate("/high", at(30) - 1, at(30));
+        win("/low", "/high", 30, Why::deactivation, "/high");
+      }
+      arrive("/low", second, is_inhibited ? Incident::Fate::discarded : Incident::Fate::accepted);
+    }
+    file_ = incident_.file(60 * kInSecond);
+  }
+
+  [[nodiscard]] ProgramResult tool(std::vector<std::string> arguments,
+                                   const std::vector<std::string>& part) const {
+    arguments.insert(arguments.begin(), {"/usr/bin/env", "TZ=UTC", ARBITER_PROGRAMS "/arbiter"});
+    arguments.insert(arguments.end(), part.begin(), part.end());
+    return run_program(arguments);
+  }
+  [[nodiscard]] ProgramResult simulated(const std::vector<std::string>& part) const {
+    return tool({"simulate", "--recording", file_}, part);
+  }
+  [[nodiscard]] ProgramResult winners(const std::vector<std::string>& part) const {
+    return tool({"recording", "winners", file_}, part);
+  }
+
+  TemporaryDirectory directory_;
+  std::string file_;
+
+ private:
+  static shm::Nanoseconds at(int second) { return second * kInSecond - kAhead; }
+  void arrive(const char* source, int second, Incident::Fate fate) {
+    const shm::Nanoseconds time = at(second) + (source == std::string("/low") ? 10 : 0);
+    incident_.arrive(source, time, time + 1, fate, 2 * kInSecond);
+  }
+
+  Incident incident_;
+};
+
+TEST_F(PartOfTheTools, IsDecidedAgain) {
+  EXPECT_THAT(simulated({}).out, HasSubstr("\n69 decisions: 69 equal,"));
+  const auto part = simulated({"--from", "00:00:25", "--to", "00:00:35"});
+  EXPECT_EQ(part.exit_code, 0) << part.err;
+  EXPECT_THAT(part.out, AllOf(HasSubstr("from 1970-01-01 00:00:25 UTC, 10.000 s: 2 sources, 15 "
+                                        "arrivals\n"),
+                              HasSubstr("\n15 decisions: 15 equal,")));
+  EXPECT_THAT(simulated({"--from", "00:00:50"}).out, HasSubstr("\n10 decisions: 10 equal,"));
+  EXPECT_THAT(simulated({"--to", "00:00:10"}).out, HasSubstr("\n9 decisions: 9 equal,"));
+}
+
+TEST_F(PartOfTheTools, IsDecidedByAnotherModel) {
+  const std::string other = directory_.write("other.xml", lasting(kReversed));
+  const auto part =
+      tool({"simulate", other, "--recording", file_}, {"--from", "00:00:28", "--to", "00:00:31"});
+  EXPECT_THAT(part.out, AllOf(HasSubstr("\n5 decisions: 1 the same, 4 changed, 0 uncertain\n"),
+                              HasSubstr("  /p: /low instead of /high\n")));
+}
+
+TEST_F(PartOfTheTools, IsExplained) {
+  const auto part = tool({"simulate", "--recording", file_, "--why=/p"},
+                         {"--from", "00:00:25.5", "--to", "00:00:31"});
+  EXPECT_EQ(part.exit_code, 0) << part.err;
+  EXPECT_THAT(part.out, AllOf(testing::StartsWith("1970-01-01 00:00:25.500 "),
+                              HasSubstr("  /p  /high wins as this begins\n"),
+                              HasSubstr("  /p  /high -> /low  because /high was deactivated"),
+                              Not(HasSubstr("00:00:31")), Not(HasSubstr("-> idle"))));
+}
+
+TEST_F(PartOfTheTools, IsExported) {
+  const std::string trace = directory_.file("trace.csv");
+  const std::string csv = directory_.file("decisions.csv");
+  const auto exported = tool({"recording", "export", file_, "--trace", trace, "--csv", csv},
+                             {"--from", "00:00:28.5", "--to", "00:00:30"});
+  EXPECT_EQ(exported.exit_code, 0) << exported.err;
+  EXPECT_EQ(content_of(trace),
+            "t_ns,source,event\n27995000000,/high,arrive\n27995000010,/low,arrive\n"
+            "28995000000,/high,arrive\n28995000010,/low,arrive\n29994999999,/high,deactivate\n");
+  EXPECT_EQ(content_of(csv),
+            "t_ns,source,destination,decision,winner\n28995000000,/high,/p,delivered,/high\n"
+            "28995000010,/low,/p,discarded,/high\n");
+}
+
+TEST_F(PartOfTheTools, HasItsWinners) {
+  const std::string low = "1970-01-01 00:00:01.000  /p  /low ";
+  const std::string high = "1970-01-01 00:00:20.000  /p  /high ";
+  const std::string again = "1970-01-01 00:00:30.000  /p  /low ";
+  EXPECT_THAT(winners({"--from", "00:00:05", "--to", "00:00:20"}).out,
+              AllOf(HasSubstr(low), Not(HasSubstr(high))));
+  EXPECT_THAT(winners({"--from", "00:00:20"}).out,
+              AllOf(HasSubstr(high), HasSubstr(again), Not(HasSubstr(low))));
+  EXPECT_EQ(winners({"--to", "00:00:00.5", "--port", "/q"}).out,
+            "nobody won in that time, at an input port that matches /q\n");
+}
+
+TEST_F(PartOfTheTools, MustLieInTheRecording) {
+  // Its beginning and its end need not.
+  EXPECT_THAT(simulated({"--from", "00:00:00", "--to", "00:05:00"}).out,
+              HasSubstr("\n69 decisions: 69 equal,"));
+  const auto expect = [&](const std::vector<std::string>& part, const std::string& text) {
+    const auto result = simulated(part);
+    EXPECT_EQ(result.exit_code, 2) << text;
+    EXPECT_THAT(result.err, HasSubstr(text));
+  };
+  expect({"--from", "00:02:00"},
+         "--from: \"00:02:00\" is not in the recording, which is from 1970-01-01 00:00:00.005 to "
+         "1970-01-01 00:01:00.005");
+  expect({"--to", "1969-12-31 23:59:00"}, "--to: \"1969-12-31 23:59:00\" is not in the recording");
+  expect({"--from", "00:00:20", "--to", "1970-01-01 00:00:10"},
+         "--to: \"1970-01-01 00:00:10\" is not after --from");
+  expect({"--from", "noon"}, "--from: \"noon\" is not a time");
+  EXPECT_EQ(winners({"--at", "00:00:20", "--from", "00:00:10"}).exit_code, 2);
+  EXPECT_EQ(tool({"simulate", "model.xml", "--trace", "t.csv"}, {"--from", "00:00:10"}).exit_code,
+            2);
+}
+
+}  // namespace
+}  // namespace arbiter::test
