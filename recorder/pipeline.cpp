@@ -56,15 +56,15 @@ Pipeline::Pipeline(RecordQueue& queue, Sink& sink, std::function<void()> failed)
         ++winner_changes_;
         changes_.push_back(std::make_shared<const Record>(std::move(change)));
       }),
-      thread_([this] { run(); }) {}
+      ended_(std::async(std::launch::async, [this] { run(); })) {}
 
 void Pipeline::run() {
   try {
     work();
   } catch (...) {
-    error_ = std::current_exception();
     failed_();
     while (!queue_.is_over()) static_cast<void>(queue_.pop(kTick));  // so that nobody fills it
+    throw;
   }
 }
 
@@ -145,15 +145,6 @@ void Pipeline::follow(const Record& record) {
     lost_events_ += missed->events;
     lost_samples_ += missed->samples;
   }
-}
-
-void Pipeline::join() {
-  if (thread_.joinable()) thread_.join();
-}
-
-void Pipeline::finish() {
-  join();
-  if (error_) std::rethrow_exception(std::exchange(error_, nullptr));
 }
 
 }  // namespace arbiter::recorder

@@ -4,15 +4,14 @@
 #pragma once
 
 #include <algorithm>
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
-#include <exception>
 #include <functional>
+#include <future>
 #include <memory>
-#include <mutex>
 #include <queue>
 #include <string>
-#include <thread>
 #include <unordered_map>
 #include <vector>
 
@@ -70,11 +69,15 @@ class Pipeline {
   Pipeline(RecordQueue& queue, Sink& sink, std::function<void()> failed);
   Pipeline(const Pipeline&) = delete;
   Pipeline& operator=(const Pipeline&) = delete;
-  // Waits until the queue has been closed and is empty.
-  ~Pipeline() { join(); }
+  // Waits until the queue has been closed, and all of it is written: a future of std::async() does.
+  ~Pipeline() = default;
 
   // The same. Throws what has gone wrong.
-  void finish();
+  void finish() { ended_.get(); }
+  // The same, for so long at most. False: it is still writing.
+  [[nodiscard]] bool ends_within(std::chrono::milliseconds patience) const {
+    return ended_.wait_for(patience) == std::future_status::ready;
+  }
   // After finish(): of the input ports' winners; what the records say is missing.
   [[nodiscard]] std::uint64_t winner_changes() const { return winner_changes_; }
   [[nodiscard]] std::uint64_t lost_events() const { return lost_events_; }
@@ -83,7 +86,6 @@ class Pipeline {
  private:
   void run();
   void work();
-  void join();
   void take(Batch&& batch);
   void pass_on_before(Nanoseconds known, Nanoseconds horizon);
   void pass_on(const RecordPtr& record);
@@ -104,8 +106,7 @@ class Pipeline {
   std::uint64_t winner_changes_ = 0;
   std::uint64_t lost_events_ = 0;
   std::uint64_t lost_samples_ = 0;
-  std::exception_ptr error_;  // of the thread, read after it has ended
-  std::thread thread_;
+  std::future<void> ended_;  // last: the thread uses all of these
 };
 
 }  // namespace arbiter::recorder

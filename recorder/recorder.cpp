@@ -1,8 +1,11 @@
 #include "recorder/recorder.hpp"
 
 #include <sys/eventfd.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <chrono>
+#include <string>
 #include <utility>
 
 #include "recorder/sleep.hpp"
@@ -13,6 +16,8 @@ namespace {
 
 // How long the writer may go without being told the time.
 constexpr Nanoseconds kPushEvery = 20'000'000;
+// Until whoever waits for the end is told why there is none.
+constexpr std::chrono::seconds kPatience{1};
 
 }  // namespace
 
@@ -97,6 +102,10 @@ Recorded Recorder::finish() {
   watcher_.look_at_pages();
   forget_taps();
   queue_.close();
+  if (!pipeline_.ends_within(kPatience)) {
+    options_.say("still writing, for the disk is slow; `kill -9 " + std::to_string(::getpid()) +
+                 "` gives up what is not written yet");
+  }
   pipeline_.finish();
   recorded_.sources = heard_.count();
   recorded_.winner_changes = pipeline_.winner_changes();

@@ -111,10 +111,22 @@ void Watcher::tell_of_daemon() {
   if (change.is_back) options_.say("a daemon is there again");
 }
 
+// Before the end of the recording says how much is missing.
+void Watcher::tell_of_disk() {
+  if (is_disk_slow_) return;
+  const Waiting waiting = queue_.waiting();
+  is_disk_slow_ = Backlog{waiting, options_.queue_bytes}.room() != Room::all;
+  if (!is_disk_slow_) return;
+  options_.say("the disk is slow, and " + std::to_string(waiting.all() >> 20) +
+               " MiB wait for it: payloads are left out, and where there are more, events; the "
+               "file says where");
+}
+
 void Watcher::look() {
   const Nanoseconds now = shm::monotonic_now();
   instance_->update();
   tell_of_daemon();
+  tell_of_disk();
   if (instance_->memory() != memory_) {
     begin_again();
     return;

@@ -72,6 +72,7 @@ class Watcher {
   void run();
   void look();
   void tell_of_daemon();
+  void tell_of_disk();
   void begin();
   void begin_again();
   void ask_daemon();
@@ -141,6 +142,7 @@ class Watcher {
   OpenPorts ports_{0};
   watch::DaemonPresence presence_;
   Nanoseconds last_ports_ = 0;
+  bool is_disk_slow_ = false;  // it has been told once
   bool may_not_observe_ = false;
   Nanoseconds next_question_ = 0;                   // where it may not
   std::vector<std::shared_ptr<TapReader>> opened_;  // and not handed over yet
