@@ -102,7 +102,7 @@ std::set<std::string> chosen_ports(const rules::RuleSet& rules,
       chosen.insert(port);
     }
     if (fits_one) continue;
-    const std::string similar = similar_pattern(pattern, {all.begin(), all.end()});
+    const std::string similar = rules::similar_pattern(pattern, {all.begin(), all.end()});
     throw std::runtime_error("no input port of the model matches --port " +
                              command_line::shell_word(pattern) +
                              (similar.empty() ? "; `arbiter rules` shows the input ports"

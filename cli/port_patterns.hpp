@@ -39,10 +39,4 @@ struct PatternNames {
 void warn_without_match(const std::string& option, const std::string& pattern,
                         const PatternNames& known);
 
-// What a pattern that matches none of the names was probably meant to be: "/Base/*" for "/Bse/*" and for
-// "Base/*".
-// Empty: nothing like it is there.
-[[nodiscard]] std::string similar_pattern(const std::string& pattern,
-                                          const std::vector<std::string_view>& names);
-
 }  // namespace arbiter::cli

@@ -184,8 +184,10 @@ std::optional<ExpressionPtr> read_condition(const XmlNode& element, ElementReade
   const auto text = reader.text(element);
   if (!text) return {};
   if (text->is_blank()) return ExpressionPtr();
-  std::vector<Mention> sources;
-  auto condition = parse_condition(*text, diagnostics, &sources);
+  std::vector<Mention> sources, globs;
+  auto condition = parse_condition(*text, diagnostics, &sources, &globs);
+  for (Mention& glob : globs)
+    model.patterns.try_emplace(std::move(glob.name), std::move(glob.where));
   for (const Mention& source : sources) model.source_uses.add(source, kRead);
   return condition;
 }

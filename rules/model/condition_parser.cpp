@@ -57,12 +57,13 @@ Operator operator_of(TokenKind kind) {
 
 class Parser {
  public:
-  Parser(const Text& text, std::vector<Mention>* sources)
-      : text_(text), sources_(sources), lexer_(text.bytes()) {}
+  Parser(const Text& text, std::vector<Mention>* sources, std::vector<Mention>* globs)
+      : text_(text), sources_(sources), globs_(globs), lexer_(text.bytes()) {}
   Parser(const Text& text, ParsedStatement& statement)
       : text_(text),
         statement_(&statement),
         sources_(&statement.sources),
+        globs_(&statement.globs),
         lexer_(text.bytes(), Language::kStatement) {}
 
   ExpressionPtr parse_all() {
@@ -161,7 +162,7 @@ class Parser {
     const Token quantifier = lexer_.take();
     Mention glob = take_pattern(quantifier);
     ExpressionPtr expression = make_quantifier(operator_of(quantifier.kind), glob.name);
-    if (statement_ != nullptr) statement_->globs.push_back(std::move(glob));
+    if (globs_ != nullptr) globs_->push_back(std::move(glob));
     return {std::move(expression)};
   }
 
@@ -326,7 +327,8 @@ class Parser {
 
   const Text& text_;
   ParsedStatement* statement_ = nullptr;     // none while a condition is parsed
-  std::vector<Mention>* sources_ = nullptr;  // none where nobody asks
+  std::vector<Mention>* sources_ = nullptr;  // none where nobody asks, as with the next
+  std::vector<Mention>* globs_ = nullptr;
   ConditionLexer lexer_;
   int nesting_ = 0;
 };
@@ -339,9 +341,10 @@ void report(ConditionError& error, const Text& text, Diagnostics& diagnostics) {
 }  // namespace
 
 std::optional<ExpressionPtr> parse_condition(const Text& text, Diagnostics& diagnostics,
-                                             std::vector<Mention>* sources) {
+                                             std::vector<Mention>* sources,
+                                             std::vector<Mention>* globs) {
   try {
-    return Parser(text, sources).parse_all();
+    return Parser(text, sources, globs).parse_all();
   } catch (ConditionError& error) {
     report(error, text, diagnostics);
     return {};

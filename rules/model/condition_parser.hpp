@@ -29,9 +29,10 @@ inline constexpr int kMaxConditionDepth = 500;
 
 // The text must not be blank: what an absent condition means is the caller's to know. Empty where
 // it is malformed, which was then reported.
-// `sources`, if given, gets each mention of a source.
+// `sources` and `globs`, if given, get each mention of a source, and each pattern of a quantifier.
 std::optional<ExpressionPtr> parse_condition(const Text& text, Diagnostics& diagnostics,
-                                             std::vector<Mention>* sources = nullptr);
+                                             std::vector<Mention>* sources = nullptr,
+                                             std::vector<Mention>* globs = nullptr);
 
 // What a statement says of the winner at a port, with "winner(/p) = /s", "winner(/p) = any(/s/*)",
 // "winner(/p) = winner(/q)", "winner(/p) = none", each with "!=" as well, or "idle(/p)". Each is an

@@ -80,12 +80,12 @@ class Extraction {
       for (const Condition& condition : behaviour.conditions) {
         expanded.push_back(expansion.expand(condition.expression));
         terms += terms_of(expanded.back());
-        warn_of_unmatched(expansion, condition.where);
+        warn_of_unmatched(expansion);
       }
     }
     for (const Select& select : model_.selects) {
       select_conditions_.push_back(expansion.expand(select.condition));
-      warn_of_unmatched(expansion, select.where);
+      warn_of_unmatched(expansion);
     }
   }
 
@@ -102,13 +102,18 @@ class Extraction {
     return terms;
   }
 
-  void warn_of_unmatched(QuantifierExpansion& expansion, const Location& where) {
+  void warn_of_unmatched(QuantifierExpansion& expansion) {
     for (const std::string& pattern : expansion.take_unmatched()) {
       if (!gives_advice_) continue;
-      diagnostics_.warning("matches-nothing", where,
+      std::string similar;
+      if (++unmatched_ <= kMaxSuggestions) {
+        similar = similar_pattern(pattern, {rules_.sources.begin(), rules_.sources.end()});
+      }
+      diagnostics_.warning("matches-nothing", model_.patterns.at(pattern),
                            "no source that the model names matches " + quote(pattern) +
-                               ": any() of it is false, all() and none() are true; correct it, or "
-                               "name the source with <source>");
+                               ": any() of it is false, all() and none() are true; " +
+                               (similar.empty() ? "correct it, or name the source with <source>"
+                                                : "did you mean " + quote(similar) + "?"));
     }
   }
 
@@ -325,6 +330,7 @@ class Extraction {
   const Hierarchy& hierarchy_;
   Diagnostics& diagnostics_;
   bool gives_advice_;
+  std::size_t unmatched_ = 0;  // patterns
   RuleSet rules_;
 
   std::unordered_map<std::string, SourceIndex> source_indices_;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <map>
 #include <optional>
 #include <set>
 #include <string>
@@ -78,6 +79,8 @@ struct Model {
 
   NameUses source_uses;
   NameUses port_uses;  // of input ports
+  // Of quantifiers in conditions: where each stands first.
+  std::map<std::string, Location> patterns;
 
   // Names of elements that were refused as a whole. Mentions of them are no further mistakes.
   std::set<std::string> refused_names;

@@ -1,8 +1,40 @@
 #include "rules/model/quantifiers.hpp"
 
+#include <algorithm>
 #include <set>
 
+#include "rules/text/names.hpp"
+
 namespace arbiter::rules {
+namespace {
+
+// As much of a name as there is of the pattern in front of its first '*': to the same '/', or
+// within a part as many bytes.
+std::string_view same_beginning(std::string_view name, std::string_view before_star) {
+  if (!before_star.ends_with('/')) return name.substr(0, before_star.size());
+  std::size_t at = 0;
+  for (auto left = std::count(before_star.begin(), before_star.end(), '/'); left > 0; --left) {
+    at = name.find('/', at);
+    if (at == std::string_view::npos) return {};
+    ++at;
+  }
+  return name.substr(0, at);
+}
+
+// As many parts of a name as the pattern begins, to the end of the last of them.
+std::string_view same_parts(std::string_view name, std::string_view before_star) {
+  if (before_star.ends_with('/')) return {};
+  const auto parts = std::count(before_star.begin(), before_star.end(), '/');
+  std::size_t at = 0;
+  for (auto left = parts; left > 0 && at != std::string_view::npos; --left) {
+    at = name.find('/', at);
+    if (at != std::string_view::npos) ++at;
+  }
+  if (at == std::string_view::npos) return {};
+  return name.substr(0, name.find_first_of("/:", at));
+}
+
+}  // namespace
 
 bool matches(std::string_view pattern, std::string_view name) {
   // Only the last '*' ever needs to take more: what fits before it cannot fit better further on.
@@ -39,6 +71,24 @@ std::vector<std::string> collect_sources(const Model& model) {
     add_sources_of(*select.condition, names, seen);
   }
   return {names.begin(), names.end()};
+}
+
+std::string similar_pattern(const std::string& pattern,
+                            const std::vector<std::string_view>& names) {
+  const std::size_t star = pattern.find('*');
+  if (star == std::string::npos) return find_similar(pattern, names).value_or("");
+  std::string before = pattern.substr(0, star);
+  if (!before.empty() && before.front() != '/') before.insert(0, 1, '/');
+  std::set<std::string> candidates;
+  for (const std::string_view name : names) {
+    for (const std::string_view beginning :
+         {same_beginning(name, before), same_parts(name, before)}) {
+      if (beginning.empty()) continue;
+      std::string candidate = std::string(beginning) + pattern.substr(star);
+      if (matches(candidate, name)) candidates.insert(std::move(candidate));
+    }
+  }
+  return find_similar(pattern, {candidates.begin(), candidates.end()}).value_or("");
 }
 
 // Conditions are no deeper than kMaxConditionDepth, hence recursion is fine.

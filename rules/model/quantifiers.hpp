@@ -15,6 +15,11 @@ namespace arbiter::rules {
 // Whether the pattern fits the whole name; '*' stands for any characters, none and '/' included.
 bool matches(std::string_view pattern, std::string_view name);
 
+// What a pattern that matches none of the names was probably meant to be: "/Base/*" for "/Bse/*"
+// and for "Base/*". Empty: nothing like it is there.
+[[nodiscard]] std::string similar_pattern(const std::string& pattern,
+                                          const std::vector<std::string_view>& names);
+
 // The sources that a model names, in configs, conditions, rules or <source>, in byte order.
 std::vector<std::string> collect_sources(const Model& model);
 

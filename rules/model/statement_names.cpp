@@ -97,7 +97,8 @@ void StatementNames::warn_if_none_wins(const std::string& port_name, const Port&
   }
   diagnostics_->warning("matches-nothing", pattern.where,
                         "no source that is connected to " + port_name + " matches " +
-                            quote(pattern.name) + ", so that none of these can win; correct it",
+                            quote(pattern.name) + ", so that none of these can win; " +
+                            correction_of(pattern.name, {port.sources.begin(), port.sources.end()}),
                         {.ports = {port_name}, .statement = statement_->text});
 }
 
@@ -130,8 +131,15 @@ void StatementNames::warn_if_unmatched(const Mention& glob) {
   if (known->second) return;
   diagnostics_->warning("matches-nothing", glob.where,
                         "no source matches " + quote(glob.name) +
-                            ": any() is false of it, all() and none() are true; correct it",
+                            ": any() is false of it, all() and none() are true; " +
+                            correction_of(glob.name, {sources_.begin(), sources_.end()}),
                         {.statement = statement_->text});
+}
+
+std::string StatementNames::correction_of(const std::string& pattern,
+                                          const std::vector<std::string_view>& names) {
+  const std::string similar = may_suggest() ? similar_pattern(pattern, names) : "";
+  return similar.empty() ? "correct it" : "did you mean " + quote(similar) + "?";
 }
 
 void StatementNames::report(std::string code, const Mention& mention, std::string message,

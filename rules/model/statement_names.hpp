@@ -39,6 +39,7 @@ class StatementNames {
   void warn_if_none_wins(const std::string& port_name, const Port& port, const Mention& pattern);
   bool check_source(const Mention& source);
   void warn_if_unmatched(const Mention& glob);
+  std::string correction_of(const std::string& pattern, const std::vector<std::string_view>& names);
   void report(std::string code, const Mention& mention, std::string message, Subject about);
   bool may_suggest();
 

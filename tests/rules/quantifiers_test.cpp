@@ -123,8 +123,10 @@ TEST(Quantifiers, OverNoMatchAreWarnedOf) {
   ASSERT_EQ(loaded.items.size(), 1u);
   const Diagnostic& warning = loaded.items[0];
   EXPECT_EQ(warning.code, "matches-nothing");
-  EXPECT_THAT(warning.message, testing::HasSubstr("/Lokc/*"));
+  EXPECT_THAT(warning.message, testing::HasSubstr("\"/Lokc/*\""));
+  EXPECT_THAT(warning.message, testing::HasSubstr("did you mean \"/Lock/*\"?"));
   EXPECT_EQ(warning.where.line, 4u);
+  EXPECT_EQ(warning.where.column, 23u);
 }
 
 TEST(Quantifiers, MayStandInsideOtherOperators) {
@@ -138,6 +140,25 @@ TEST(Quantifiers, RangeOverTheSourcesOfAllFiles) {
                   "<source port='/a/2'/>"});
   EXPECT_THAT(show_rules(loaded, "/p"), ElementsAre("/a/1: (not(/a/1) and not(/a/2))"));
   EXPECT_THAT(loaded.rules.sources, ElementsAre("/a/1", "/a/2"));
+}
+
+TEST(SimilarPattern, NamesPartsThatExist) {
+  const std::vector<std::string_view> names{"/Base/cmd:i", "/BaseLeft/cmd:i", "/gaze:i",
+                                            "/Head/Gaze/pos:i"};
+  const std::vector<std::pair<std::string, std::string>> cases{{"Base*", "/Base*"},
+                                                               {"Base/*", "/Base/*"},
+                                                               {"/Bse/*", "/Base/*"},
+                                                               {"/Bsae*", "/Base*"},
+                                                               {"/base*", "/Base*"},
+                                                               {"/gaez*", "/gaze*"},
+                                                               {"/Haed/*", "/Head/*"},
+                                                               {"/Head/Gzae*", "/Head/Gaze*"},
+                                                               {"Head/Gaze/*", "/Head/Gaze/*"},
+                                                               {"/Gaze/po:i", ""},
+                                                               {"/Arm/*", ""},
+                                                               {"*x", ""},
+                                                               {"/bse/cmd:i", "/Base/cmd:i"}};
+  for (const auto& [typed, meant] : cases) EXPECT_EQ(similar_pattern(typed, names), meant) << typed;
 }
 
 }  // namespace

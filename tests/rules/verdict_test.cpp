@@ -161,6 +161,11 @@ TEST(Verdict, APortOfTheOtherKindIsNamedAsThat) {
 }
 
 TEST(Verdict, APatternThatNothingMatchesIsAWarning) {
+  const auto meant = judged(arm_and_base(), "none(/Objetc*) or winner(/Arm) = any(/Objetc*)\n");
+  ASSERT_EQ(meant.diagnostics.items().size(), 2u);
+  for (const auto& item : meant.diagnostics.items()) {
+    EXPECT_THAT(item.message, HasSubstr("did you mean \"/Object*\"?"));
+  }
   const auto result = judged(arm_and_base(), "none(/Teleop*)\n");
   ASSERT_EQ(result.diagnostics.items().size(), 1u);
   EXPECT_EQ(result.diagnostics.items()[0].code, "matches-nothing");
