@@ -88,6 +88,14 @@ constexpr auto kNoComparisons = std::to_array<Foreign>({
      "it is not"},
 });
 
+// In a statement, where winners are compared; before the words below are looked for.
+constexpr auto kForeignStatementWords = std::to_array<Foreign>({
+    {"is", "write = behind winner(…); a source's name by itself says that it is active"},
+    {"nobody", "write idle(/Arm/pos:i), or none behind winner(/Arm/pos:i) ="},
+    {"wins", "write winner(/Arm/pos:i) = /Teleop/pos:o"},
+    {"always", "a statement must be true in every state: write it alone"},
+});
+
 constexpr auto kForeignWords = std::to_array<Foreign>({
     {"active", "a source's name by itself says that it is active: write the name alone"},
     {"isactive", "a source's name by itself says that it is active: write the name alone"},
@@ -107,6 +115,9 @@ constexpr auto kForeignWords = std::to_array<Foreign>({
     {"never", "write not"},
     {"always", "a rule holds whenever it is true: write the condition alone"},
     {"equals", "write iff"},
+    {"for", "how long a source stays active says the timeout of its <source>"},
+    {"1", "write true"},
+    {"0", "write false"},
     {"but", "write and"},
 });
 
@@ -122,11 +133,14 @@ bool is_letter_or_digit(char byte) {
   if (language == Language::kStatement) {
     words.insert(words.end(), kStatementWords.begin(), kStatementWords.end());
   }
-  for (const auto& [spelling, advice] : kForeignWords) {
-    if (spelling == lower) {
+  const auto reject = [&](const auto& foreign) {
+    for (const auto& [spelling, advice] : foreign) {
+      if (spelling != lower) continue;
       throw ConditionError{at, quote(word) + " is no keyword here; " + std::string(advice)};
     }
-  }
+  };
+  if (language == Language::kStatement) reject(kForeignStatementWords);
+  reject(kForeignWords);
   for (const auto& [spelling, kind] : kStatementWords) {
     if (spelling == lower && language == Language::kCondition) {
       throw ConditionError{at,
@@ -142,8 +156,12 @@ bool is_letter_or_digit(char byte) {
     }
     known.push_back(spelling);
   }
+  const std::string name = "/" + std::string(word);
+  const bool is_like_name = word.find_first_of("/:") != std::string_view::npos;
   throw ConditionError{at, quote(word) + " is neither a keyword nor a port's name" +
-                               advise(word, known, "names begin with '/'")};
+                               advise(word, known,
+                                      is_like_name ? "names begin with '/': write " + quote(name)
+                                                   : "names begin with '/'")};
 }
 
 // What to do about a character that no name has without quotes.

@@ -171,6 +171,19 @@ TEST(Statement, WhatIsMalformedIsReportedWithItsPlaceAndTheOthersAreRead) {
   EXPECT_THAT(found.items[6].message, HasSubstr("write idle for"));
 }
 
+TEST(Statement, SaysWhatToWriteForWordsOfOthers) {
+  const auto found = read(
+      "winner(/p) is /a\n"
+      "winner(/p) = nobody\n"
+      "wins(/p, /a)\n"
+      "always /a\n");
+  ASSERT_EQ(found.items.size(), 4u);
+  EXPECT_THAT(found.items[0].message, HasSubstr("write = behind winner(…)"));
+  EXPECT_THAT(found.items[1].message, HasSubstr("write idle(/Arm/pos:i), or none behind"));
+  EXPECT_THAT(found.items[2].message, HasSubstr("write winner(/Arm/pos:i) = /Teleop/pos:o"));
+  EXPECT_THAT(found.items[3].message, HasSubstr("must be true in every state: write it alone"));
+}
+
 TEST(Statement, ConditionsOfAModelDoNotSpeakOfWinners) {
   const auto loaded = load_text(
       "<behavior name='A'><config at='/p'>/a</config><condition>idle(/p)</condition></behavior>");
