@@ -64,6 +64,10 @@ std::size_t Hierarchy::look_up(const Mention& mention) const {
   std::string advice = known.empty() ? "" : advice_on_source(mention.name);
   if (!list.empty()) {
     advice = "; names are separated by commas: write " + quote(list);
+  } else if (mention.name.find(';') != std::string::npos) {
+    advice = "; names are separated by commas";
+  } else if (mention.name.find('*') != std::string::npos || mention.name == "all") {
+    advice = "; each is named by itself, or all that are in one meta-behaviour by its name";
   } else if (advice.empty()) {
     advice = advise(mention.name, known,
                     "define it, correct the name, or give the file that has it as well");
