@@ -58,6 +58,7 @@ void require_no_port_among_files(const SimulateOptions& options) {
 std::string suggestion(const std::string& source, const rules::Simulation& simulation,
                        std::size_t count) {
   if (count > rules::kMaxSuggestions) return "";
+  if (simulation.find_port(source)) return "; it is an input port: name who publishes there";
   std::vector<std::string_view> known;
   for (std::size_t i = 0; i < simulation.source_count(); ++i) {
     known.push_back(simulation.source_name(static_cast<shm::SourceId>(i)));

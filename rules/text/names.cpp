@@ -56,12 +56,10 @@ struct Compared {
 
 Compared compared(std::string_view name) {
   Compared result;
-  if (name.starts_with('/')) {
-    name.remove_prefix(1);
-    if (name.size() > 2 && name[name.size() - 2] == ':') {
-      result.direction = name.substr(name.size() - 1);
-      name.remove_suffix(2);
-    }
+  if (name.starts_with('/')) name.remove_prefix(1);
+  if (name.size() > 2 && name[name.size() - 2] == ':') {
+    result.direction = name.substr(name.size() - 1);
+    name.remove_suffix(2);
   }
   for (const char each : name) result.own += each >= 'A' && each <= 'Z' ? char(each + 32) : each;
   return result;

@@ -67,6 +67,13 @@ TEST_F(Simulate, NotesAnUnknownSourceOnce) {
                             "[unknown-source]\n    2 | 0,/who\n      |   ^\n1 note\n");
 }
 
+TEST_F(Simulate, SaysOfAnInputPortThatItIsNoSource) {
+  EXPECT_THAT(
+      simulate("t_ns,source\n0,/p\n").err,
+      HasSubstr("no effect; it is an input port: name who publishes there [unknown-source]"));
+  EXPECT_THAT(simulate("t_ns,source\n0,low\n").err, HasSubstr("no effect; did you mean \"/low\"?"));
+}
+
 TEST_F(Simulate, WritesNoResultOfABadTrace) {
   const auto result = simulate("t_ns,source\n0,/low\nbad,/low\n5,/low,arrive\n4,/low\n3,/low\n");
   EXPECT_EQ(result.exit_code, 1);

@@ -87,6 +87,7 @@ TEST(Names, AMisspeltOneIsRecognised) {
   EXPECT_EQ(find_similar("/faec:o", {"/face:i", "/face:o"}), "/face:o");
   EXPECT_EQ(find_similar("/a:i", {"/b:i", "/a:o"}), "/a:o") << "the other end";
   EXPECT_EQ(find_similar("/CMD", {"/cmd:i"}), "/cmd:i");
+  EXPECT_EQ(find_similar("a:o", {"/a:o"}), "/a:o") << "the slash is missing";
   EXPECT_EQ(find_similar("/stp:o", {"/stop:i"}), "/stop:i");
   EXPECT_EQ(find_similar("abcd", {"abxy", "abcx"}), "abcx") << "the nearest one";
   EXPECT_EQ(find_similar("wyh", {"who", "why"}), "why") << "two in the wrong order are one slip";
