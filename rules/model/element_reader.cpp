@@ -87,6 +87,10 @@ std::string_view advice_on(std::string_view attribute, std::string_view element,
     return "write the output port between the tags: <config at=\"…\">…</config>";
   }
   if (element == "config" && (attribute == "to" || attribute == "port")) return "did you mean at?";
+  if (element == "arbiter" && (attribute == "port" || attribute == "to")) return "did you mean at?";
+  if (element == "select" && contains({"when", "if", "condition"}, attribute)) {
+    return "write the condition between the tags: <select from=\"…\">…</select>";
+  }
   if (element == "select" && (attribute == "to" || attribute == "at")) {
     return "the <arbiter at=\"…\"> around it says where";
   }

@@ -166,7 +166,8 @@ bool check_characters(const TextFile& file, Diagnostics& diagnostics, std::size_
     if (shm::is_control(character.code) && !shm::is_blank(content[i])) {
       diagnostics.error("invalid-character", file.locate(i),
                         "the control character " + in_hex(character.code) +
-                            " must not occur in this file; remove it");
+                            " must not occur in this file; " +
+                            (character.code == 0 ? "save the file in UTF-8" : "remove it"));
       return false;
     }
     i += character.length;

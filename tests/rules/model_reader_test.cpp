@@ -239,6 +239,10 @@ TEST(ModelReader, UnknownMissingAndRepeatedAttributesAreErrors) {
        "1:20 error unknown-attribute", "it takes name"},
       {"<behavior name='B' inhibits='C'><config at='/p'>/s</config></behavior>",
        "1:20 error unknown-attribute", "write <inhibition>…</inhibition> between its tags"},
+      {"<arbiter at='/p'><select from='/s' when='/a'/></arbiter>", "1:36 error unknown-attribute",
+       "write the condition between the tags: <select from="},
+      {"<arbiter at='/p' port='/p'><select from='/s'/></arbiter>", "1:18 error unknown-attribute",
+       "did you mean at?"},
       {"<meta_behavior name='M' condition='/s'/>", "1:25 error unknown-attribute",
        "write <condition>…</condition> between its tags"},
       {"<behavior><config at='/p'>/s</config></behavior>", "1:1 error missing-attribute",
@@ -328,6 +332,8 @@ TEST(ModelReader, WrongValuesAreErrors) {
 TEST(ModelReader, BytesThatNoModelHasAreErrors) {
   expect_findings({
       {std::string("<behaviors>\n\0</behaviors>", 25), "2:1 error invalid-character", "0x00"},
+      {std::string("\0<\0b", 4), "1:1 error invalid-character",
+       "0x00 must not occur in this file; save"},
       {"<behaviors>\x01</behaviors>", "1:12 error invalid-character", "control character 0x01"},
       {"<behaviors>\x7f</behaviors>", "1:12 error invalid-character", "control character 0x7f"},
       {"<!-- \xc2\x85 -->", "1:6 error invalid-character", "control character 0x85"},
