@@ -95,7 +95,8 @@ void add_graph(CLI::App& app, int& exit_code) {
       "  arbiter graph search_and_track.xml --hosts two_hosts.xml -o hosts.svg\n"
       "  arbiter graph --follow -o now.svg\n\n"
       "Exit codes: 0 drawn; 1 an error in the model, a port that it lacks or that is on no host,\n"
-      "no daemon, no Graphviz, or a model that is not the one in force; 2 wrong use, or a file\n"
+      "no daemon, no Graphviz, or a model that is not the one in force; 2 wrong use, or a file "
+      "that\n"
       "cannot be opened or written");
   verb->callback([options, &exit_code] { exit_code = graph(*options); });
 }

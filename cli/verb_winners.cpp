@@ -327,7 +327,7 @@ void add_winners(CLI::App& app, int& exit_code) {
             if (options->every >= kLookEvery) return;
             throw CLI::ValidationError("--every", "must be at least 2ms");
           },
-          "How often to publish the winner where it has not changed (default 1s)")
+          "How often to publish the winner where it has not changed, 2ms or more (default 1s)")
       ->type_name("DURATION");
   add_instance_option(*verb, options->instance);
   verb->footer(
