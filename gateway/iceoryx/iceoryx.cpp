@@ -115,7 +115,7 @@ void Iceoryx::tend() {
     if (!roudi) return;
     std::vector<ChunkSender*> senders;
     for (const Out& each : outs_) senders.push_back(each.sender.get());
-    joined_ = now;
+    joined_ = told_roudi_ = now;
     session_ = std::make_unique<Session>(name_, *roudi, ins_, senders);
     return;
   }
@@ -134,7 +134,9 @@ void Iceoryx::tend() {
   if (silence > kSilentTooLong && !is_roudi_stopped()) {
     throw NeedsNewProcess("RouDi runs but is silent: it has given the gateway up");
   }
-  set_obstacle(silence > kSilent ? "RouDi does not answer" : "");
+  if (can_be_told(roudi_socket_path())) told_roudi_ = now;
+  const bool hangs = silence > kSilent || now - told_roudi_ > kSilent;
+  set_obstacle(hangs ? "RouDi does not answer" : "");
   look_after_senders();
   tell_obstacles();
 }

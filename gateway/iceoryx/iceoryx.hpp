@@ -43,7 +43,8 @@ class Iceoryx final : public Middleware {
   std::vector<Out> outs_;
   std::vector<OpenIn> ins_;
   std::unique_ptr<Session> session_;
-  shm::Nanoseconds joined_ = 0;  // when the session began
+  shm::Nanoseconds joined_ = 0;      // when the session began
+  shm::Nanoseconds told_roudi_ = 0;  // when it could be told something last
   std::string obstacle_;
   bool has_started_ = false;
 };

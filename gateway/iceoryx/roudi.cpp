@@ -1,5 +1,6 @@
 #include "gateway/iceoryx/roudi.hpp"
 
+#include <poll.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
 #include <sys/un.h>
@@ -17,6 +18,21 @@
 #include "watch/process.hpp"
 
 namespace arbiter::gateway {
+namespace {
+
+// None: nobody has it bound.
+shm::FileDescriptor connect_to(const std::string& socket_path) {
+  sockaddr_un address{};
+  address.sun_family = AF_UNIX;
+  if (socket_path.size() >= sizeof address.sun_path) return {};
+  std::memcpy(address.sun_path, socket_path.data(), socket_path.size());
+  shm::FileDescriptor socket(::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0));
+  const auto* const to = reinterpret_cast<const sockaddr*>(&address);
+  if (!socket || ::connect(socket.get(), to, sizeof address) != 0) return {};
+  return socket;
+}
+
+}  // namespace
 
 std::string roudi_socket_path() {
   return std::string(iox::platform::IOX_UDS_SOCKET_PATH_PREFIX) +
@@ -26,22 +42,20 @@ std::string roudi_socket_path() {
 // The file outlives a RouDi that was killed; but then nobody has it bound, and the kernel refuses
 // to connect.
 std::optional<RoudiIdentity> find_roudi(const std::string& socket_path) {
-  sockaddr_un address{};
-  address.sun_family = AF_UNIX;
-  if (socket_path.size() >= sizeof address.sun_path) return {};
-  std::memcpy(address.sun_path, socket_path.data(), socket_path.size());
-  const shm::FileDescriptor socket(::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0));
   struct stat before {};
   struct stat after {};
-  if (!socket || ::stat(socket_path.c_str(), &before) != 0) return {};
-  if (::connect(socket.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
-    return {};
-  }
+  if (::stat(socket_path.c_str(), &before) != 0 || !connect_to(socket_path)) return {};
   // Another one may have come in between.
   if (::stat(socket_path.c_str(), &after) != 0 || before.st_ino != after.st_ino) return {};
   return RoudiIdentity{
       before.st_dev, before.st_ino,
       std::int64_t{before.st_ctim.tv_sec} * 1'000'000'000 + before.st_ctim.tv_nsec};
+}
+
+bool can_be_told(const std::string& socket_path) {
+  const shm::FileDescriptor socket = connect_to(socket_path);
+  pollfd polled{socket.get(), POLLOUT, 0};
+  return socket && ::poll(&polled, 1, 0) == 1;
 }
 
 bool is_closed_to_us(const std::string& socket_path) {

@@ -25,6 +25,11 @@ struct RoudiIdentity {
 // Nothing: none runs. A stopped one does. Sends it nothing.
 [[nodiscard]] std::optional<RoudiIdentity> find_roudi(const std::string& socket_path);
 
+// False: so much waits for it in its socket that nobody can tell it anything now. If that lasts, it
+// hangs, perhaps for a lock that a program which has died has left behind, and still says once a
+// second how things stood.
+[[nodiscard]] bool can_be_told(const std::string& socket_path);
+
 // Users and groups may be in the way: of this user to RouDi's socket, or of RouDi's to those that
 // iceoryx makes for this process, which are of its user and group.
 [[nodiscard]] bool is_closed_to_us(const std::string& socket_path);

@@ -79,6 +79,23 @@ TEST_F(Iceoryx, ARouDiThatHangsLaterIsToldAndWhatIsConnectedGoesOn) {
   });
 }
 
+// One that waits for a lock still says, once a second, how things stood.
+TEST_F(Iceoryx, ARouDiThatSomebodyWhoHasDiedKeepsFromReadingIsTold) {
+  std::optional<Roudi> roudi(directory_);
+  Spoken gate = gateway(directory_, in("low", "/Low:o") + out("/Base:i", "base"));
+  wait_for_description("/Low:o", "no publisher matched");
+  Spoken lock({ARBITER_TESTS "/plain_iceoryx_lock", "Test", "One", "low"});
+  ASSERT_EQ(lock.process.wait(), 0);
+  wait_for_description("/Low:o", "RouDi does not answer");
+  wait_until([&] {
+    return described_input("/Base:i").find("RouDi does not answer") != std::string::npos;
+  });
+  roudi->process.kill();
+  ASSERT_TRUE(gate.hear("RouDi has gone; the gateway begins anew")) << gate.heard;
+  roudi.emplace(directory_);
+  expect_that_samples_pass();
+}
+
 // It notices that its ends are dead when it touches them, or after ten seconds without a word.
 TEST_F(Iceoryx, AGatewayThatRouDiHasGivenUpBeginsAnew) {
   const Roudi roudi(directory_);
