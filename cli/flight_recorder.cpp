@@ -4,7 +4,9 @@
 #include <sys/epoll.h>
 #include <sys/eventfd.h>
 #include <sys/signalfd.h>
+#include <unistd.h>
 
+#include <functional>
 #include <iostream>
 #include <mutex>
 #include <optional>
@@ -13,6 +15,7 @@
 
 #include "cli/condition.hpp"
 #include "cli/live.hpp"
+#include "logging/log_writer.hpp"
 #include "recorder/dump_socket.hpp"
 #include "recorder/recorder.hpp"
 #include "recorder/ring.hpp"
@@ -37,6 +40,7 @@ class Flight {
   Flight(const FlightOptions& options, const recorder::RecorderOptions& settings,
          const recording::McapOptions& file, const evidence::RecordingInfo& info)
       : options_(options),
+        say_(settings.say),
         condition_(condition_of(options)),
         interrupts_(catch_interrupts()),
         signal_(catch_dump_signal()),
@@ -60,8 +64,7 @@ class Flight {
   int run() {
     const std::string span = options_.span == shm::kForever ? "records that fit into the memory"
                                                             : seconds_text(options_.span);
-    std::cerr << "arbiter: keeping the last " + span + " of " +
-                     rules::counted(recorder_.taps(), "source") + '\n';
+    say_("keeping the last " + span + " of " + rules::counted(recorder_.taps(), "source"));
     recorder_.run(time_after(shm::monotonic_now(), options_.duration), events_.get(),
                   [this] { return take_up_events(); });
     statement_.reset();
@@ -117,8 +120,8 @@ class Flight {
     for (const recorder::Dumped& each : all) {
       const std::string answer =
           each.error.empty() ? "written " + each.file : "failed " + each.error;
-      std::cout << answer << std::endl;
-      for (const std::string& file : each.removed) std::cout << "removed " << file << std::endl;
+      out_.put(answer + '\n');
+      for (const std::string& file : each.removed) out_.put("removed " + file + '\n');
       for (const std::uint64_t request : each.requests) socket_.answer(request, answer + '\n');
     }
   }
@@ -130,6 +133,8 @@ class Flight {
   }
 
   const FlightOptions& options_;
+  const std::function<void(const std::string&)> say_;
+  logging::LogWriter out_{STDOUT_FILENO};  // nobody need read it while it records
   const std::optional<rules::Statement> condition_;
   const shm::FileDescriptor interrupts_;
   const shm::FileDescriptor signal_;

@@ -5,6 +5,7 @@
 #include <csignal>
 #include <cstdint>
 #include <fstream>
+#include <functional>
 #include <iostream>
 #include <memory>
 #include <sstream>
@@ -22,6 +23,7 @@
 #include "cli/recording_info.hpp"
 #include "cli/verbs.hpp"
 #include "command_line/shell_word.hpp"
+#include "logging/log_writer.hpp"
 #include "recorder/recorder.hpp"
 #include "recording/compression.hpp"
 #include "rules/text/names.hpp"
@@ -72,6 +74,13 @@ void warn_of_patterns_without_port(const RecordOptions& options) {
   }
 }
 
+// Whoever does not read standard error must not hold up the recording.
+std::function<void(const std::string&)> standard_error() {
+  const std::shared_ptr<logging::LogWriter> writer(
+      new logging::LogWriter(logging::LogWriter::to_standard_error("arbiter: ")));
+  return [writer](const std::string& text) { writer->put("arbiter: " + text + '\n'); };
+}
+
 recorder::RecorderOptions recorder_options(const RecordOptions& options) {
   recorder::RecorderOptions result;
   result.caller = caller("record", options.instance);
@@ -80,7 +89,8 @@ recorder::RecorderOptions recorder_options(const RecordOptions& options) {
   result.ports = options.ports;
   result.payloads = options.payloads;
   result.period = options.period;
-  result.say = [](const std::string& text) { std::cerr << "arbiter: " + text + '\n'; };
+  result.say = standard_error();
+  result.node.on_notice = [say = result.say](const Notice& notice) { say(notice.text); };
   return result;
 }
 
@@ -116,8 +126,7 @@ int record_into_file(const RecordOptions& options, const recorder::RecorderOptio
   recorder::FileSink sink(options.out, {compression_of(options.compression)}, info_of(settings));
   try {
     recorder::Recorder recorder(settings, sink);
-    std::cerr << "arbiter: recording " + rules::counted(recorder.taps(), "source") + " into " +
-                     options.out + '\n';
+    settings.say("recording " + rules::counted(recorder.taps(), "source") + " into " + options.out);
     recorder.run(time_after(shm::monotonic_now(), options.duration), interrupts.get(),
                  [] { return false; });
     const auto recorded = recorder.finish();

@@ -10,6 +10,7 @@
 #include "evidence/record_reader.hpp"
 #include "tests/client/component.hpp"
 #include "tests/recorder/recording.hpp"
+#include "tests/support/full_pipe.hpp"
 
 namespace arbiter::test {
 namespace {
@@ -21,14 +22,14 @@ using testing::SizeIs;
 class Flight : public testing::Test {
  protected:
   explicit Flight() : prefix_(daemon_.directory() + "/flight") {}
-  // Returns once it runs.
-  ChildProcess fly(std::vector<std::string> more = {}) {
+  // Returns once it runs. `out`: its standard output; -1: this one's.
+  ChildProcess fly(std::vector<std::string> more = {}, int out = -1) {
     more.insert(more.begin(), {std::string(ARBITER_PROGRAMS) + "/arbiter", "record", "--ring",
                                "5min", "-o", prefix_});
     const std::string err = daemon_.directory() + "/flight.err";
     const shm::FileDescriptor file(
         ::open(err.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600));
-    ChildProcess process(more, {}, {-1, -1, file.get()});
+    ChildProcess process(more, {}, {-1, out, file.get()});
     pollfd ended{process.descriptor(), POLLIN, 0};
     while (content_of(err).find("keeping the last") == std::string::npos) {
       if (::poll(&ended, 1, 1) == 1) throw std::runtime_error("it has ended: " + content_of(err));
@@ -99,6 +100,17 @@ TEST_F(Flight, WritesWhereItIsAsked) {
   EXPECT_EQ(recorder.wait(), 0);
   EXPECT_FALSE(std::filesystem::exists(prefix_ + ".sock"));
   EXPECT_EQ(arbiter({"record", "--dump", "-o", prefix_}).exit_code, 1);
+}
+
+// As behind a pager, or where the collector of its lines is stopped.
+TEST_F(Flight, GoesOnWhereNobodyReadsItsLines) {
+  FullPipe pipe;
+  ChildProcess recorder = fly({}, pipe.write_end());
+  recorder.signal(SIGUSR1);
+  wait_for_files(1);
+  EXPECT_NE(dumped(), "");
+  recorder.signal(SIGTERM);
+  EXPECT_EQ(recorder.wait(), 0);
 }
 
 // As where the SSH session closes in which it was started.

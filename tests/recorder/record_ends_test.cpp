@@ -11,6 +11,7 @@
 #include "tests/client/component.hpp"
 #include "tests/recorder/recording.hpp"
 #include "tests/support/await.hpp"
+#include "tests/support/full_pipe.hpp"
 
 namespace arbiter::test {
 namespace {
@@ -31,6 +32,19 @@ TEST(Record, HasAWholeFileAfterAHangup) {
   const auto read = evidence::read_recording(recording.file(), evidence::Payloads::pass_over,
                                              [](evidence::Record&& /*any*/) {});
   EXPECT_TRUE(read.end.is_whole) << read.end.problem;
+}
+
+TEST(Record, EndsWhereNobodyReadsItsStandardError) {
+  Daemon daemon(kLasting);
+  const std::string file = daemon.directory() + "/unread.mcap";
+  FullPipe pipe;
+  ChildProcess recorder({std::string(ARBITER_PROGRAMS) + "/arbiter", "record", "-o", file}, {},
+                        {-1, -1, pipe.write_end()});
+  Node node("test");
+  auto low = node.output_port<int>("/low");
+  await([&] { return daemon.taps_of("/low") == 1; });
+  recorder.signal(SIGTERM);
+  EXPECT_EQ(recorder.wait(), 0);
 }
 
 TEST(Record, GoesOnAfterAHangupThatIsIgnored) {
