@@ -26,7 +26,7 @@ evidence::TimeSpan read_part(const PartOptions& options, const RecordedTime& rec
   if (!options.from.empty()) {
     part.from = read_time("--from", options.from, recorded).from;
     require_within("--from", options.from, {part.from, shm::kForever}, recorded);
-    rest.begin = std::max(recorded.begin, part.from);
+    part.from = rest.begin = std::max(recorded.begin, part.from);
   }
   if (options.to.empty()) return part;
   part.to = read_time("--to", options.to, rest).from;

@@ -293,11 +293,13 @@ Recorded load_winners(const std::string& path) {
 }
 
 // When it begins and ends, by which times of day are understood, only the whole file tells.
+TimeSpan part_of(const std::string& path, const PartOptions& options) {
+  if (options.is_all()) return {};
+  return read_part(options, time_of(load(path, evidence::Wanted::winners, {})));
+}
+
 Recorded load_for_simulation(const std::string& path, const PartOptions& part) {
-  Recorded recorded =
-      load(path, evidence::Wanted::all,
-           part.is_all() ? TimeSpan{}
-                         : read_part(part, time_of(load(path, evidence::Wanted::winners, {}))));
+  Recorded recorded = load(path, evidence::Wanted::all, part_of(path, part));
   say_damage(path, recorded);
   return recorded;
 }

@@ -22,6 +22,8 @@ struct SimulateRecordingOptions {
 // All that is recorded, or the part of it. Says on standard error where the file is not whole.
 // Throws McapError, RecordError, CLI::ValidationError.
 evidence::Recorded load_for_simulation(const std::string& path, const PartOptions& part);
+// The part of it; without options, all. Throws as the above.
+evidence::TimeSpan part_of(const std::string& path, const PartOptions& options);
 // Without most of what is not about winners.
 evidence::Recorded load_winners(const std::string& path);
 

@@ -12,6 +12,8 @@
 #include "cli/live.hpp"
 #include "cli/numbers.hpp"
 #include "cli/progress.hpp"
+#include "cli/recording_part.hpp"
+#include "cli/simulate_recording.hpp"
 #include "cli/verbs.hpp"
 #include "command_line/shell_word.hpp"
 #include "evidence/record_reader.hpp"
@@ -29,6 +31,7 @@ struct ReplayVerb {
   bool is_fast = false;
   std::vector<std::string> sources;
   std::vector<std::string> ports;
+  PartOptions part;
   std::string instance;
 };
 
@@ -89,6 +92,7 @@ int replay(const ReplayVerb& verb) {
   options.speed = verb.is_fast ? 0 : verb.speed;
   options.sources = verb.sources;
   options.ports = verb.ports;
+  options.part = part_of(verb.file, verb.part);
   ProgressLine line;
   options.watch = line.watch("looking for what the recording has");
   options.say = [&line](const std::string& text) {
@@ -152,10 +156,12 @@ void add_replay(CLI::App& app, int& exit_code) {
                    "repeatable")
       ->type_name("PATTERN")
       ->allow_extra_args(false);
+  add_part_options(*verb, options->part);
   add_instance_option(*verb, options->instance);
   verb->footer(
       "Example:\n"
       "  arbiter replay incident.mcap --instance desk\n"
+      "  arbiter replay night.mcap --from 03:10:00 --to 03:20:00\n"
       "  arbiter replay incident.mcap --port /Arm/pos:i --speed 2\n\n"
       "The ports must be free: stop their components, or use an instance of its own.\n\n"
       "Exit codes: 0 all published; 1 no daemon, or the ports cannot be opened; 2 wrong use, or a "

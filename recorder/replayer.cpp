@@ -26,6 +26,7 @@ using evidence::Record;
 constexpr Nanoseconds kLead = 20'000'000;
 
 struct Interrupted {};
+struct Past {};  // what follows need not be read
 
 Time time_at(Nanoseconds time) { return Time(std::chrono::nanoseconds(time)); }
 
@@ -81,9 +82,10 @@ Replayer::Replayer(const ReplayOptions& options) : options_(options) {
 }
 
 void Replayer::survey() {
+  first_ = options_.part.from;
   const auto about = evidence::read_recording(
       options_.file, evidence::Payloads::pass_over, [this](Record&& record) { survey(record); },
-      options_.watch);
+      options_.watch, options_.part);
   if (!about.end.is_whole) {
     options_.say(options_.file + ": " + about.end.problem + "; what comes before is published");
   }
@@ -108,7 +110,7 @@ void Replayer::survey(const Record& record) {
   if (const auto* start = std::get_if<evidence::Start>(&record)) {
     if (first_ == 0) first_ = start->time;
   } else if (const auto* model = std::get_if<evidence::ModelChange>(&record)) {
-    if (!model_) model_ = *model;
+    if (!model_ || model->time <= options_.part.from) model_ = *model;
   }
   const auto* context = evidence::context_of(record);
   if (context == nullptr) return;
@@ -126,18 +128,26 @@ void Replayer::survey(const Record& record) {
     sources_of_ports_[port].insert(context->source);
   }
   if (arrival != nullptr) {
-    source.has_events = true;
+    note_event(source, arrival->time, arrival->word);
+    if (!options_.part.has(arrival->time)) return;
     source.samples += arrival->is_sample ? 1 : 0;
     source.payloads += has_payload ? 1 : 0;
     source.largest = std::max(source.largest, arrival->size);
-    source.word = arrival->word;
-    latest_ = std::max(latest_, arrival->time);
   } else if (const auto* over = std::get_if<evidence::Deactivation>(&record)) {
-    source.has_events = true;
-    source.word = shm::deactivated(source.word, over->time);
-    latest_ = std::max(latest_, over->time);
+    note_event(source, over->time, shm::deactivated(source.word, over->time));
   } else if (const auto* state = std::get_if<evidence::SourceState>(&record)) {
     survey(*state, source);
+  }
+}
+
+// What was before the part is how it is as that begins.
+void Replayer::note_event(Source& source, Nanoseconds time, evidence::ActivityWord word) {
+  source.word = word;
+  if (time < options_.part.from) {
+    source.at_start = word;
+  } else if (options_.part.has(time)) {
+    source.has_events = true;
+    latest_ = std::max(latest_, time);
   }
 }
 
@@ -146,7 +156,7 @@ void Replayer::survey(const evidence::SourceState& state, Source& source) {
   if (!source.has_events && state.seen <= first_) source.at_start = state.word;
   if (before == state.word || !shm::is_deactivation(state.word)) return;
   const Nanoseconds time = shm::time_of(state.word, shm::kForever);
-  if (time <= first_ || time > state.seen) return;
+  if (time <= first_ || time > state.seen || !options_.part.has(time)) return;
   source.has_events = true;
   latest_ = std::max(latest_, time);
   untold_.push_back({state.context, time, state.seen, state.sequence, state.generation});
@@ -229,25 +239,44 @@ void Replayer::open_ports() {
 Replayed Replayer::run(const shm::FileDescriptor& interrupts) {
   Replayed replayed;
   replayed.sources = sources_.size();
-  start_ = last_ = shm::monotonic_now() + kLead;
+  const auto use = [&](Record&& record) {
+    const auto* context = evidence::context_of(record);
+    const bool is_event = std::holds_alternative<Arrival>(record) ||
+                          std::holds_alternative<evidence::Deactivation>(record);
+    const Nanoseconds time = evidence::time_of(record);
+    if (is_past(time)) throw Past();
+    if (!is_event || !options_.part.has(time) || sources_.count(context->source) == 0) return;
+    begin(interrupts);
+    deactivate_untold(time, interrupts, replayed);
+    await(time, interrupts);
+    publish(record, replayed);
+  };
   try {
-    if (sleep_until(start_, {interrupts.get()})) throw Interrupted();
-    signal_active_ones();
-    evidence::read_recording(options_.file, evidence::Payloads::read, [&](Record&& record) {
-      const auto* context = evidence::context_of(record);
-      const bool is_event = std::holds_alternative<Arrival>(record) ||
-                            std::holds_alternative<evidence::Deactivation>(record);
-      if (!is_event || sources_.count(context->source) == 0) return;
-      deactivate_untold(evidence::time_of(record), interrupts, replayed);
-      await(evidence::time_of(record), interrupts);
-      publish(record, replayed);
-    });
+    try {
+      evidence::read_recording(options_.file, evidence::Payloads::read, use, {}, options_.part);
+    } catch (const Past&) {
+    }
+    begin(interrupts);
     deactivate_untold(shm::kForever, interrupts, replayed);
   } catch (const Interrupted&) {
     replayed.was_interrupted = true;
   }
-  replayed.time = shm::monotonic_now() - start_;
+  if (has_begun_) replayed.time = shm::monotonic_now() - start_;
   return replayed;
+}
+
+// Nothing of the part stands so far behind it.
+bool Replayer::is_past(Nanoseconds recorded) const {
+  constexpr Nanoseconds kLate = 10'000'000'000;
+  return recorded >= kLate && recorded - kLate >= options_.part.to;
+}
+
+// With the first event: to come to a part takes time.
+void Replayer::begin(const shm::FileDescriptor& interrupts) {
+  if (std::exchange(has_begun_, true)) return;
+  start_ = last_ = shm::monotonic_now() + kLead;
+  if (sleep_until(start_, {interrupts.get()})) throw Interrupted();
+  signal_active_ones();
 }
 
 // Those that came before that time.

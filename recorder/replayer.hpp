@@ -28,6 +28,7 @@ struct ReplayOptions {
   double speed = 1;                  // 2: twice as fast as it was; 0: as fast as possible
   std::vector<std::string> sources;  // patterns; empty: all
   std::vector<std::string> ports;    // patterns of input ports; empty: all
+  evidence::TimeSpan part{};         // only what happened then
   std::function<void(const std::string&)> say;
   recording::Watch watch{};  // of the first reading
 };
@@ -89,12 +90,15 @@ class Replayer {
   void survey();
   void survey(const evidence::Record& record);
   void survey(const evidence::SourceState& state, Source& source);
+  void note_event(Source& source, Nanoseconds time, evidence::ActivityWord word);
   void choose();
   [[nodiscard]] bool is_at_chosen_port(const std::string& source) const;
   using Excepted = std::function<bool(const std::string& source)>;
   void refuse_without_payloads(const Excepted& is_excepted) const;
   void open_port(const std::string& name, Source& source);
   void open_ports();
+  [[nodiscard]] bool is_past(Nanoseconds recorded) const;
+  void begin(const shm::FileDescriptor& interrupts);
   void signal_active_ones();
   void signal_active(Source& source, Nanoseconds arrived);
   void deactivate_untold(Nanoseconds recorded, const shm::FileDescriptor& interrupts,
@@ -107,14 +111,15 @@ class Replayer {
   const ReplayOptions& options_;
   std::map<std::string, Source> sources_;
   std::map<std::string, std::set<std::string>> sources_of_ports_;
-  std::optional<evidence::ModelChange> model_;  // the first
+  std::optional<evidence::ModelChange> model_;  // in force at first
   // Those that the recorder has only seen in the state that they have left, as an operator's.
   std::vector<evidence::Deactivation> untold_;
   std::size_t next_untold_ = 0;
-  Nanoseconds first_ = 0;   // of the recording
+  Nanoseconds first_ = 0;   // of the recording, or of the part
   Nanoseconds latest_ = 0;  // of its arrivals and deactivations
   std::optional<Node> node_;
   bool keeps_times_ = false;
+  bool has_begun_ = false;
   Nanoseconds start_ = 0;  // of the replay
   Nanoseconds last_ = 0;   // due time
 };

@@ -5,8 +5,10 @@
 #include <string>
 #include <vector>
 
-#include "tests/cli/arbiter_program.hpp"
+#include <arbiter/arbiter.hpp>
+
 #include "tests/evidence/incident.hpp"
+#include "tests/recorder/recording.hpp"
 #include "tests/support/temporary_directory.hpp"
 
 namespace arbiter::test {
@@ -69,6 +71,7 @@ class PartOfTheTools : public testing::Test {
   void arrive(const char* source, int second, Incident::Fate fate) {
     const shm::Nanoseconds time = at(second) + (source == std::string("/low") ? 10 : 0);
     incident_.arrive(source, time, time + 1, fate, 2 * kInSecond);
+    incident_.put_payload(8);
   }
 
   Incident incident_;
@@ -115,6 +118,24 @@ TEST_F(PartOfTheTools, IsExported) {
   EXPECT_EQ(content_of(csv),
             "t_ns,source,destination,decision,winner\n28995000000,/high,/p,delivered,/high\n"
             "28995000010,/low,/p,discarded,/high\n");
+}
+
+// Who was active as it begins arrives first, and is not counted.
+TEST_F(PartOfTheTools, IsReplayed) {
+  Daemon daemon(kLasting);
+  Node node("test");
+  auto in = node.input_port("/p", {.depth = 16});
+  const auto replayed =
+      tool({"replay", file_, "--speed", "1000000", "--instance", daemon.instance()},
+           {"--from", "00:00:28.5", "--to", "00:00:30"});
+  EXPECT_EQ(replayed.exit_code, 0) << replayed.err;
+  EXPECT_THAT(replayed.out, HasSubstr("2 samples, 0 signals and 1 deactivation of 2 sources in "));
+  const auto taken = in.take();
+  ASSERT_TRUE(taken);
+  EXPECT_EQ(taken->source(), "/high");
+  EXPECT_FALSE(in.take());
+  EXPECT_THAT(tool({"replay", file_, "--as-fast-as-possible"}, {"--from", "00:00:50"}).out,
+              HasSubstr("10 samples, 0 signals and 0 deactivations of 1 source in "));
 }
 
 TEST_F(PartOfTheTools, HasItsWinners) {
