@@ -189,9 +189,11 @@ class UnpublishedSources {
         "the rule of " + rule.source + " at " + port + " reads " + std::string(source) +
             ", which no connection and no module of the application publishes: it will never be "
             "active" +
-            (meant ? "; did you mean " + quote(*meant) + "?"
-                   : std::string("; correct the name, or add the module whose <prefix> or <name> "
-                                 "it begins with")),
+            (!meant ? std::string("; correct the name, or add the module whose <prefix> or <name> "
+                                  "it begins with")
+             : meant->starts_with('/')
+                 ? "; did you mean " + quote(*meant) + "?"
+                 : "; put a slash in front of " + quote(*meant) + " in the application"),
         {.ports = {port}, .source = std::string(source)});
   }
 
@@ -214,16 +216,24 @@ class MeantEnds {
     }
   }
 
-  // ": did you mean …?", or nothing.
-  std::string ask(const std::string& source, const std::string& port) {
-    if (++asked_ > kMaxSuggestions) return "";
+  std::string advise(const std::string& source, const std::string& port) {
+    const std::string advice = "add it there, or correct the names here";
+    if (++asked_ > kMaxSuggestions) return advice;
+    const auto reversed = sources_at_.find(source);
+    if (reversed != sources_at_.end() && std::find(reversed->second.begin(), reversed->second.end(),
+                                                   port) != reversed->second.end()) {
+      return "exchange the two ends of that from " + port + " to " + source + " there";
+    }
     const auto look_in = [](const Ends& ends, const std::string& right, const std::string& wrong) {
       const auto found = ends.find(right);
       return found == ends.end() ? std::nullopt : find_similar(wrong, found->second);
     };
     auto meant = look_in(sources_at_, port, source);
     if (!meant) meant = look_in(ports_of_, source, port);
-    return meant ? ": did you mean " + quote(*meant) + "?" : "";
+    if (!meant) return advice;
+    // Whoever writes that here is told to put a slash in front.
+    if (!meant->starts_with('/')) return "put a slash in front of " + quote(*meant) + " there";
+    return advice + ": did you mean " + quote(*meant) + "?";
   }
 
  private:
@@ -261,8 +271,7 @@ void check_application(const Application& application, const Model& model, RuleS
       if (application.is_incomplete || connected.count({rule.source, port.port}) != 0) continue;
       diagnostics.error("not-in-application", rule.where,
                         "the application has no connection from " + rule.source + " to " +
-                            port.port + "; add it there, or correct the names here" +
-                            ends.ask(rule.source, port.port),
+                            port.port + "; " + ends.advise(rule.source, port.port),
                         {.ports = {port.port}, .source = rule.source, .behaviour = rule.behaviour});
     }
   }

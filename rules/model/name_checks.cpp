@@ -117,6 +117,13 @@ class NameCheck {
 
   void warn(const std::string& name, const NameUse& use, std::string_view meant) {
     const NameUse& other = *all_.find(std::string(meant));
+    if (!meant.starts_with('/')) {  // in an application; nobody may write it in a model
+      diagnostics_.warning("similar-name", use.where,
+                           "the name " + name + " stands only here" + origin_of(use) + "; at " +
+                               describe(other.where) + " is " + std::string(meant) +
+                               ", without a slash in front: put one there");
+      return;
+    }
     diagnostics_.warning("similar-name", use.where,
                          "the name " + name + " stands only here" + origin_of(use) +
                              ", and nothing declares it; did you mean " + std::string(meant) +

@@ -155,7 +155,8 @@ TEST(Application, ThatLacksAConfiguredConnectionIsAnErrorOfTheModel) {
       "<application>" + connection("/s", "/p") + connection("/q", "/s") + "</application>");
   EXPECT_THAT(loaded.findings(true), ElementsAre("a.xml:3:1 error not-in-application",
                                                  "a.xml:5:18 error not-in-application"));
-  EXPECT_THAT(loaded.message(0), HasSubstr("the application has no connection from /s to /q; add"));
+  EXPECT_THAT(loaded.message(0),
+              HasSubstr("the application has no connection from /s to /q; exchange"));
   EXPECT_THAT(loaded.message(1), HasSubstr("from /t to /p"));
 }
 
@@ -163,7 +164,9 @@ TEST(Application, ThatHasAConnectionOfNearlyThatNameIsAskedAbout) {
   const auto message = [](const std::string& source, const std::string& port) {
     return load_with_application(
                "<behavior name='B'><config at='" + port + "'>" + source + "</config></behavior>",
-               "<application>" + connection("/Rest/pos:o", "/Arm/pos:i") + "</application>")
+               "<application>" + connection("/Rest/pos:o", "/Arm/pos:i") +
+                   connection("Face/pos:o", "/Gaze/pos:i") + connection("/Face/pos:o", "Face:i") +
+                   connection("/Hand/pos:i", "/Grasp/pos:o") + "</application>")
         .message();
   };
   const std::string advice = "; add it there, or correct the names here";
@@ -172,6 +175,12 @@ TEST(Application, ThatHasAConnectionOfNearlyThatNameIsAskedAbout) {
   EXPECT_THAT(message("/Rest/pos:o", "/Arm/po:i"),
               HasSubstr(advice + ": did you mean \"/Arm/pos:i\"?"));
   EXPECT_THAT(message("/Rest/pos:o", "/Gaze/pos:i"), testing::EndsWith(advice));
+  EXPECT_THAT(message("/Face/pos:o", "/Gaze/pos:i"),
+              HasSubstr("; put a slash in front of \"Face/pos:o\" there"));
+  EXPECT_THAT(message("/Face/pos:o", "/Face:i"),
+              HasSubstr("; put a slash in front of \"Face:i\" there"));
+  EXPECT_THAT(message("/Grasp/pos:o", "/Hand/pos:i"),
+              HasSubstr("; exchange the two ends of that from /Hand/pos:i to /Grasp/pos:o there"));
 }
 
 TEST(Application, MistakesAreReportedAtTheirPlace) {

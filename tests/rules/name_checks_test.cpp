@@ -217,6 +217,21 @@ TEST(NameChecks, TheApplicationKnowsNamesAndItsOwnAreNotJudged) {
               ElementsAre("2:16 warning similar-name", "1:143 note not-arbitrated"));
 }
 
+// What it calls so, nobody may write in a model.
+TEST(NameChecks, AnApplicationsNameThatLacksItsSlashIsToBeCorrectedThere) {
+  const Loaded loaded = load_with_application(
+      "<behaviors><behavior name='B'><config at='/Base/vel:i'>/Nav/vel:o</config>\n"
+      "<condition>not /estop:o</condition></behavior></behaviors>",
+      "<application><module><prefix>/Nav</prefix></module>"
+      "<connection><from>/Nav/vel:o</from><to>/Base/vel:i</to></connection>"
+      "<connection><from>estop:o</from><to>/log:i</to></connection></application>");
+  EXPECT_THAT(loaded.findings(),
+              ElementsAre("2:1 warning never-published", "2:16 warning similar-name"));
+  EXPECT_THAT(loaded.message(0),
+              HasSubstr("; put a slash in front of \"estop:o\" in the application"));
+  EXPECT_THAT(loaded.message(1), HasSubstr("is estop:o, without a slash in front: put one there"));
+}
+
 // It may have been the very name that is missing.
 TEST(NameChecks, AreNotAskedWhereANameMayHaveBeenRefused) {
   EXPECT_THAT(load_condition("not /estopp:o and", "<source port='/estop:o'/>").findings(),
