@@ -217,6 +217,10 @@ void DdsMiddleware::leave_for_new_peers(Site& site) {
   say(Level::kWarning, "peers= of DDS domain " + std::to_string(site.domain->id()) + ": " + change +
                            ": joining the domain again");
   close(site);
+  // Until then nobody is matched.
+  for (Account* const account : site.accounts) {
+    account->set_obstacle("its DDS domain is being joined again", false);
+  }
   site.open_again = 0;
 }
 

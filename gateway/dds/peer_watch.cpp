@@ -44,19 +44,32 @@ LookedUp look_up(const std::string& host) {
 }
 
 // The first answer is taken for what DDS has had.
-void PeerAddresses::note(const std::string& name, std::set<std::string> addresses) {
-  const auto [place, is_first] = places_.try_emplace(name, Place{addresses, addresses});
-  if (!is_first && !addresses.empty()) place->second.now = std::move(addresses);
+void PeerAddresses::note(const std::string& name, std::set<std::string> addresses,
+                         shm::Nanoseconds now) {
+  Place& place = places_.try_emplace(name, Place{addresses}).first->second;
+  if (addresses.empty()) return;
+  std::erase_if(place.lately, [&](const auto& each) { return now - each.second > kRemembered; });
+  for (const std::string& address : addresses) {
+    const bool is_new = place.lately.insert_or_assign(address, now).second;
+    place.alternates = place.alternates || (!is_new && !place.now.contains(address));
+  }
+  place.now = std::move(addresses);
+  if (place.lately.size() == place.now.size()) place.alternates = false;
 }
 
 void PeerAddresses::accept(shm::Nanoseconds now) {
   if (!change_of_any().empty()) quiet_until_ = now + kBetweenChanges;
-  for (auto& [name, place] : places_) place.joined = place.now;
+  for (auto& [name, place] : places_) place.joined = known(name);
 }
 
 std::set<std::string> PeerAddresses::known(const std::string& name) const {
-  const auto place = places_.find(name);
-  return place == places_.end() ? std::set<std::string>() : place->second.now;
+  const auto at = places_.find(name);
+  if (at == places_.end()) return {};
+  const Place& place = at->second;
+  std::set<std::string> result = place.now;
+  if (!place.alternates) return result;
+  for (const auto& [address, seen] : place.lately) result.insert(address);
+  return result;
 }
 
 // Even if somebody has found one meanwhile, or finds the same as before.
@@ -101,7 +114,7 @@ struct PeerWatch::Shared {
         auto found = look_up(name).addresses;
         const std::lock_guard lock(mutex);
         if (ends) return;
-        addresses.note(name, std::move(found));
+        addresses.note(name, std::move(found), shm::monotonic_now());
       }
       std::unique_lock lock(mutex);
       if (news.wait_for(lock, kBetweenLooks, [this] { return ends; })) return;

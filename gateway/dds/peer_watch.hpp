@@ -19,9 +19,14 @@ namespace arbiter::gateway::dds {
 // What names lead to. Thread safety: one thread.
 class PeerAddresses {
  public:
+  // A name that has several addresses may lead to one of them at a time. Once it leads back to one,
+  // all that it has led to within so long are its own. Not for ever, nor without that: some day
+  // they are somebody else's, and to look for a host at each costs datagrams.
+  static constexpr shm::Nanoseconds kRemembered = 600'000'000'000;
+
   // `addresses`: none, and the name cannot be looked up now, which changes nothing.
-  void note(const std::string& name, std::set<std::string> addresses);
-  // DDS is about to join: what they lead to now is what it goes by from now on.
+  void note(const std::string& name, std::set<std::string> addresses, shm::Nanoseconds now);
+  // DDS is about to join: what is known() now is what it goes by from now on.
   void accept(shm::Nanoseconds now);
   // Of a name; empty: none is known.
   [[nodiscard]] std::set<std::string> known(const std::string& name) const;
@@ -35,8 +40,10 @@ class PeerAddresses {
 
  private:
   struct Place {
-    std::set<std::string> joined;
-    std::set<std::string> now;
+    std::set<std::string> joined{};
+    std::set<std::string> now{};                       // at the last answer
+    std::map<std::string, shm::Nanoseconds> lately{};  // when each was in an answer last
+    bool alternates = false;                           // it has led back to one of them
   };
   [[nodiscard]] std::string change_of_any() const;
 

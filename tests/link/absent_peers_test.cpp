@@ -16,6 +16,7 @@
 #include <cstring>
 #include <fstream>
 #include <memory>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -169,11 +170,11 @@ TEST_F(Cable, ANameThatGetsAnAddressLaterIsLookedUpAgain) {
 
 TEST(PeerAddresses, ChangeWhereNoneOfThoseIsLeftThatThereWere) {
   gateway::dds::PeerAddresses peers;
-  peers.note("base", {"10.0.0.1", "10.0.0.2"});
+  peers.note("base", {"10.0.0.1", "10.0.0.2"}, 0);
   EXPECT_EQ(peers.change(1), "");
-  peers.note("base", {"10.0.0.2", "10.0.0.3"});
+  peers.note("base", {"10.0.0.2", "10.0.0.3"}, 0);
   EXPECT_EQ(peers.change(1), "");
-  peers.note("base", {"10.0.0.3"});
+  peers.note("base", {"10.0.0.3"}, 0);
   EXPECT_EQ(peers.change(1), "base has the address 10.0.0.3 now");
   peers.accept(1);
   EXPECT_EQ(peers.change(60'000'000'001), "");
@@ -181,25 +182,25 @@ TEST(PeerAddresses, ChangeWhereNoneOfThoseIsLeftThatThereWere) {
 
 TEST(PeerAddresses, AreThoseOfBeforeWhereNobodyKnowsThemNow) {
   gateway::dds::PeerAddresses peers;
-  peers.note("base", {"10.0.0.1"});
-  peers.note("base", {});
+  peers.note("base", {"10.0.0.1"}, 0);
+  peers.note("base", {}, 0);
   peers.accept(1);
-  peers.note("base", {"10.0.0.1"});
+  peers.note("base", {"10.0.0.1"}, 0);
   EXPECT_EQ(peers.change(1), "");
 }
 
 TEST(PeerAddresses, AreNewWhereThereWereNone) {
   gateway::dds::PeerAddresses peers;
-  peers.note("base", {});
+  peers.note("base", {}, 0);
   EXPECT_EQ(peers.change(1), "");
-  peers.note("base", {"10.0.0.1"});
+  peers.note("base", {"10.0.0.1"}, 0);
   EXPECT_EQ(peers.change(1), "base has the address 10.0.0.1 now");
 }
 
 // A name server that has answered before may be silent while DDS joins, and answer again later.
 TEST(PeerAddresses, AreNewWhereDdsHasFoundNone) {
   gateway::dds::PeerAddresses peers;
-  peers.note("base", {"10.0.0.1"});
+  peers.note("base", {"10.0.0.1"}, 0);
   peers.accept(1);
   EXPECT_EQ(peers.change(1), "");
   peers.note_unknown("base");
@@ -207,21 +208,47 @@ TEST(PeerAddresses, AreNewWhereDdsHasFoundNone) {
   peers.note_unknown("head");  // nobody has looked it up yet
   EXPECT_EQ(peers.change(1), "base has the address 10.0.0.1 now");
   peers.accept(1);
-  peers.note("head", {"10.0.0.2"});
+  peers.note("head", {"10.0.0.2"}, 0);
   EXPECT_EQ(peers.change(60'000'000'001), "head has the address 10.0.0.2 now");
 }
 
 // Each time the link joins its network again, and is silent for a while.
 TEST(PeerAddresses, ChangeOnceAMinuteAtMost) {
   gateway::dds::PeerAddresses peers;
-  peers.note("base", {"10.0.0.1"});
+  peers.note("base", {"10.0.0.1"}, 0);
   peers.accept(1);
-  peers.note("base", {"10.0.0.2"});
+  peers.note("base", {"10.0.0.2"}, 0);
   EXPECT_NE(peers.change(2), "");
   peers.accept(2);
-  peers.note("base", {"10.0.0.1"});
+  peers.note("base", {"10.0.0.3"}, 0);
   EXPECT_EQ(peers.change(60'000'000'001), "");
   EXPECT_NE(peers.change(60'000'000'002), "");
+}
+
+// A name server may tell one of several addresses at a time, in turn. One that has only changed is
+// not looked for any more.
+TEST(PeerAddresses, AreAllThatANameHasLedToLatelyOnceItLeadsBack) {
+  using Addresses = std::set<std::string>;
+  constexpr shm::Nanoseconds kSecond = 1'000'000'000;
+  gateway::dds::PeerAddresses peers;
+  const auto join_for = [&](const std::string& address, shm::Nanoseconds now) {
+    peers.note("base", {address}, now);
+    EXPECT_EQ(peers.change(now), "base has the address " + address + " now");
+    peers.accept(now);
+    return peers.known("base");
+  };
+  peers.note("base", {"10.0.0.1"}, 0);
+  peers.accept(0);
+  EXPECT_EQ(join_for("10.0.0.2", 60 * kSecond), (Addresses{"10.0.0.2"}));
+  EXPECT_EQ(join_for("10.0.0.1", 120 * kSecond), (Addresses{"10.0.0.1", "10.0.0.2"}));
+  for (int i = 0; i < 10; ++i) {
+    const shm::Nanoseconds now = (200 + 5 * i) * kSecond;
+    peers.note("base", {i % 2 == 0 ? "10.0.0.1" : "10.0.0.2"}, now);
+    EXPECT_EQ(peers.change(now), "");
+  }
+  const shm::Nanoseconds later = 300 * kSecond + gateway::dds::PeerAddresses::kRemembered;
+  EXPECT_EQ(join_for("10.0.0.3", later), (Addresses{"10.0.0.3"}));
+  EXPECT_EQ(join_for("10.0.0.4", later + 60 * kSecond), (Addresses{"10.0.0.4"}));
 }
 
 // A name server that has answered may be silent when DDS joins again.

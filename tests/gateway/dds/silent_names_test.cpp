@@ -39,6 +39,7 @@ struct NameServer {
   int given_up = 0;              // how often somebody has waited to the end
   std::string address_of_later;  // empty: it has none yet
   Questions about_later;
+  bool may_join = true;  // or whoever joins a domain waits
 };
 NameServer& name_server() {
   static NameServer& one = *new NameServer;
@@ -54,8 +55,9 @@ extern "C" dds_entity_t dds_create_domain(dds_domainid_t domain, const char* con
   static const auto real =
       reinterpret_cast<decltype(&dds_create_domain)>(::dlsym(RTLD_NEXT, "dds_create_domain"));
   {
-    const std::lock_guard lock(name_server().mutex);
+    std::unique_lock lock(name_server().mutex);
     configurations.emplace_back(configuration);
+    name_server().changed.wait(lock, [] { return name_server().may_join; });
   }
   return real(domain, configuration);
 }
@@ -96,6 +98,7 @@ class DdsNames : public ::testing::Test {
     name_server().given_up = 0;
     name_server().address_of_later.clear();
     name_server().about_later = {};
+    name_server().may_join = true;
     configurations.clear();
   }
   ~DdsNames() override { answer(); }
@@ -103,6 +106,11 @@ class DdsNames : public ::testing::Test {
   static void answer() {
     const std::lock_guard lock(name_server().mutex);
     name_server().answers = true;
+    name_server().changed.notify_all();
+  }
+  static void let_join(bool may) {
+    const std::lock_guard lock(name_server().mutex);
+    name_server().may_join = may;
     name_server().changed.notify_all();
   }
   static int given_up() {
@@ -229,8 +237,13 @@ TEST_F(DdsNames, ADomainIsJoinedAgainForAnAddressThatComesLaterOnceSomebodyIsMis
     const int before = give_address();
     tend_until([&] { return questions().by_us > before + 1; });  // the one before has been answered
     EXPECT_EQ(joined().size(), 1u);
+    let_join(false);
   }
-  tend_until([&] { return joined().size() == 2 && send(sender) == Sender::Result::kSent; });
+  tend_until([&] { return joined().size() == 2; });
+  EXPECT_EQ(account.state().find("matched"), std::string::npos) << account.state();
+  let_join(true);
+  tend_until([&] { return send(sender) == Sender::Result::kSent; });
+  tend_until([&] { return account.state().find("no subscriber matched") != std::string::npos; });
   EXPECT_NE(joined().back().find("127.0.0.2"), std::string::npos);
   EXPECT_EQ(questions().by_dds, 1) << "a name server may be silent again";
 }
