@@ -20,14 +20,16 @@ constexpr Nanoseconds kWaitForLate = 200'000'000;
 constexpr std::size_t kMostHeldBack = std::size_t{16} << 20;
 
 // By which records are ordered. What a publisher says of its source counts for the last arrival:
-// where some were lost, one that is later than all that has been told. Where it begins to tell, an
-// operator may have deactivated its source since.
+// where some were lost, one that is later than all that has been told. Where nobody has told yet,
+// an operator may have deactivated the source: when, its page says.
 Nanoseconds key_of(const Record& record) {
   if (const auto* state = std::get_if<evidence::SourceState>(&record)) {
-    if (state->why == evidence::SourceState::Why::page) return state->seen;
-    const bool is_over =
-        state->why == evidence::SourceState::Why::joined && shm::is_deactivation(state->word);
-    return is_over ? shm::time_of(state->word, shm::kForever) : state->time;
+    const bool is_page = state->why == evidence::SourceState::Why::page;
+    const bool is_joined = state->why == evidence::SourceState::Why::joined;
+    if ((is_page || is_joined) && shm::is_deactivation(state->word)) {
+      return shm::time_of(state->word, shm::kForever);
+    }
+    return is_page ? state->seen : state->time;
   }
   if (std::holds_alternative<evidence::DestinationsChange>(record)) return 0;
   return evidence::time_of(record);

@@ -96,6 +96,30 @@ TEST(Record, HasWhatAPortDidThatWasOpenedWhileItWasStopped) {
   EXPECT_TRUE(recording.records<evidence::Missed>().empty());
 }
 
+// It reads the page long after.
+TEST(Record, HasTheTimeAtWhichAnOperatorDeactivatedWhileItWasStopped) {
+  Daemon daemon(kLasting);
+  Node node("test");
+  auto low = node.output_port<int>("/low");
+  {
+    auto high = node.output_port<int>("/high");
+    high.publish(1);
+  }
+  Recording recording(daemon);
+  recording.process().stop();
+  EXPECT_EQ(arbiter({"deactivate", "/high"}).exit_code, 0);
+  low.publish(1);
+  recording.process().signal(SIGINT);
+  EXPECT_EQ(recording.end(SIGCONT), 0) << recording.error();
+  const auto winners = recording.records<evidence::WinnerChange>();
+  ASSERT_EQ(winners.size(), 3U);
+  EXPECT_EQ(winners[0].winner, "/high");
+  EXPECT_EQ(winners[1].winner, "");
+  EXPECT_EQ(winners[1].why, evidence::WinnerChange::Why::deactivation);
+  EXPECT_EQ(winners[2].winner, "/low");
+  EXPECT_EQ(winners[2].why, evidence::WinnerChange::Why::arrival);
+}
+
 // Of a name that nobody has had, there is no tap yet.
 TEST(Record, SaysThatItMissedWhatANewSourceDidBeforeItWasFound) {
   Daemon daemon(kLasting);

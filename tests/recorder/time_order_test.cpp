@@ -87,27 +87,33 @@ TEST(TimeOrder, WhatAPageSaysStandsBehindWhatWasBefore) {
   EXPECT_EQ(times, (std::vector<evidence::Nanoseconds>{200, 250, 300, 350}));
 }
 
-// An operator has deactivated the source before its port was opened again.
-TEST(TimeOrder, WhatAPublisherFindsStandsAtItsTime) {
-  recorder::TimeOrder order;
-  std::vector<std::string> sources;
-  const auto add = [&](auto record, const char* source) {
-    auto context = std::make_shared<evidence::SourceContext>();
-    context->source = source;
-    record.context = std::move(context);
-    order.add(std::make_shared<const evidence::Record>(std::move(record)), 1000);
-  };
-  evidence::SourceState state;
-  state.why = evidence::SourceState::Why::joined;
-  state.word = shm::deactivation(300);
-  add(state, "/again");
-  evidence::Arrival arrival;
-  arrival.time = 200;
-  add(arrival, "/other");
-  order.take_before(1000, [&](const evidence::RecordPtr& record) {
-    sources.push_back(evidence::context_of(*record)->source);
-  });
-  EXPECT_EQ(sources, (std::vector<std::string>{"/other", "/again"}));
+// An operator has deactivated the source while nobody had it open: that is read later.
+TEST(TimeOrder, ADeactivationByAnOperatorStandsAtItsTime) {
+  using Why = evidence::SourceState::Why;
+  for (const Why why : {Why::page, Why::joined}) {
+    recorder::TimeOrder order;
+    std::vector<std::string> sources;
+    const auto add = [&](auto record, const char* source) {
+      auto context = std::make_shared<evidence::SourceContext>();
+      context->source = source;
+      record.context = std::move(context);
+      order.add(std::make_shared<const evidence::Record>(std::move(record)), 1000);
+    };
+    evidence::SourceState state;
+    state.why = why;
+    state.seen = 500;
+    state.word = shm::deactivation(300);
+    add(state, "/again");
+    evidence::Arrival arrival;
+    arrival.time = 200;
+    add(arrival, "/other");
+    arrival.time = 400;
+    add(arrival, "/later");
+    order.take_before(1000, [&](const evidence::RecordPtr& record) {
+      sources.push_back(evidence::context_of(*record)->source);
+    });
+    EXPECT_EQ(sources, (std::vector<std::string>{"/other", "/again", "/later"}));
+  }
 }
 
 // Names may come and go for as long as it is recorded.
