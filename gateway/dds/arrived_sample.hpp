@@ -27,6 +27,10 @@ class ArrivedSample : public ForeignSample {
   [[nodiscard]] bool has_field_at(std::size_t offset) const noexcept {
     return encapsulation_.is_plain && (offset == 0 || encapsulation_.encoding == Encoding::kXcdr1);
   }
+  // Whether its data reach to `end`, and not only what it is padded with. It is readable.
+  [[nodiscard]] bool reaches(std::size_t end) const noexcept {
+    return data_bytes(encapsulation_, payload_.size - kEncapsulationBytes) >= end;
+  }
 
   // Whether it may be one of a type that has so many bytes of data in plain CDR. It is readable.
   [[nodiscard]] bool may_have(std::size_t data) const noexcept {

@@ -64,7 +64,9 @@ InTopic::Fault InTopic::fault_of(const ArrivedSample& sample) const noexcept {
   if (!sample.is_readable()) return Fault::kHeader;
   if (const auto& size = topic().size; size && !sample.may_have(*size)) return Fault::kSize;
   const auto& choice = entry().choice;
-  return choice && !sample.has_field_at(choice->offset) ? Fault::kEncoding : Fault::kNone;
+  if (!choice) return Fault::kNone;
+  if (!sample.has_field_at(choice->offset)) return Fault::kEncoding;
+  return sample.reaches(choice->offset + size_of(choice->field)) ? Fault::kNone : Fault::kField;
 }
 
 InTopic::Fault InTopic::fault_of(Incoming::Fate fate) const noexcept {

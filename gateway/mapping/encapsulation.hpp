@@ -16,6 +16,9 @@ struct Encapsulation {
   // The fields follow each other, without headers between them. An appendable type of XCDR2 begins
   // with its length, a mutable one has a header before each field.
   bool is_plain = false;
+  // Of the bytes behind it the last ones, up to 3, that are none of the sample's: what stands there
+  // is no field. Who does not say it says 0.
+  std::size_t padding = 0;
 };
 // Of a sample, or of its beginning.
 [[nodiscard]] Encapsulation read_encapsulation(std::span<const std::byte> sample) noexcept;
@@ -25,12 +28,21 @@ struct Encapsulation {
   return (size + 3) & ~std::size_t{3};
 }
 
+// How many of so many bytes behind such a header are the sample's. What is not padded has nothing
+// to take away, whatever was said of it when it was.
+[[nodiscard]] constexpr std::size_t data_bytes(const Encapsulation& encapsulation,
+                                               std::size_t bytes) noexcept {
+  const bool is_padded = bytes == padded(bytes) && bytes >= encapsulation.padding;
+  return is_padded ? bytes - encapsulation.padding : bytes;
+}
+
 // Whether so many bytes behind such a header may be a sample of a type that has `size` of them in
 // plain CDR, neither more nor less. Other encodings add bytes of their own.
 [[nodiscard]] constexpr bool may_have(const Encapsulation& encapsulation, std::size_t bytes,
                                       std::size_t size) noexcept {
-  if (!encapsulation.is_plain) return bytes >= size;
-  return bytes == size || bytes == padded(size);
+  const std::size_t data = data_bytes(encapsulation, bytes);
+  if (!encapsulation.is_plain) return data >= size;
+  return data == size || (encapsulation.padding == 0 && bytes == padded(size));
 }
 
 }  // namespace arbiter::gateway

@@ -207,6 +207,42 @@ TEST(DdsHostile, ANumberThatStandsElsewhereEndsBothSources) {
   EXPECT_EQ(battery.published("/no:o"), 0);
 }
 
+// Cut off at each byte, and then padded to a multiple of four, as RTPS wants it: what it is padded
+// with is not the field.
+TEST(DdsHostile, ASampleThatEndsBeforeItsFieldEndsBothSources) {
+  constexpr std::size_t kOffset = 5;
+  Choosing button("robots", "strangers::Robot",
+                  R"(topic="robots" type="strangers::Robot" true="/yes:o" false="/no:o" )"
+                  R"(offset="5")");
+  const auto with_padding = [](const std::string& data) {
+    const char padding = static_cast<char>((4 - data.size() % 4) % 4);
+    return std::string("\0\1\0", 3) + padding + data;
+  };
+  const std::string before(kOffset, 'a');
+  for (std::size_t size = 0; size <= kOffset; ++size) {
+    button.publish_to("/yes:o", with_padding(before + '\1'));
+    button.publish_to_none(with_padding(before.substr(0, size)));
+  }
+  EXPECT_EQ(button.published("/no:o"), 0);
+  button.publish_to("/no:o", with_padding(before + '\0'));
+}
+
+TEST(DdsHostile, ANumberThatIsCutOffEndsBothSources) {
+  Choosing battery("robots", "strangers::Robot",
+                   R"(topic="robots" type="strangers::Robot" above="/yes:o" below="/no:o" )"
+                   R"(threshold="0.2" field="f32" offset="4")");
+  const std::string half("\0\0\0?", 4);  // 0.5
+  const std::string big(half.rbegin(), half.rend());
+  for (std::size_t size = 0; size < 8; ++size) {
+    battery.publish_to("/yes:o", kLittle + "aaaa" + half);
+    const std::string cut = ("aaaa" + half).substr(0, size);
+    const char padding = static_cast<char>((4 - size % 4) % 4);
+    battery.publish_to_none(std::string("\0\1\0", 3) + padding + cut);
+  }
+  EXPECT_EQ(battery.published("/no:o"), 0);
+  battery.publish_to("/yes:o", std::string(4, '\0') + "aaaa" + big);
+}
+
 TEST(DdsHostile, ItLivesThroughDatagramsThatAreNoneOfRtps) {
   const OwnDomain domain;
   const Daemon daemon(base_model("1000s"));
