@@ -33,35 +33,41 @@ std::optional<std::string_view> quoted_source(std::string_view text) {
 }
 
 // Those that were passed over and may have to be handed on: to read them takes twenty times as
-// long.
+// long. Of each source the last arrival, and the first deactivation behind it: to deactivate once
+// more changes nothing.
 class PassedEvents {
  public:
-  // In place of an earlier one of that source.
   void put(std::string_view source, RecordKind kind, std::uint64_t number, std::string_view text) {
     auto found = of_sources_.find(source);
-    if (found == of_sources_.end()) found = of_sources_.emplace(source, PassedEvent{}).first;
-    found->second = {kind, number, std::string(text)};
+    if (found == of_sources_.end()) found = of_sources_.emplace(source, OfSource{}).first;
+    auto& [arrival, deactivation] = found->second;
+    if (kind == RecordKind::kArrival) {
+      arrival = {kind, number, std::string(text)};
+      deactivation.number = 0;
+    } else if (deactivation.number == 0) {
+      deactivation = {kind, number, std::string(text)};
+    }
   }
-  // In place of whatever was the last.
-  void put_last(RecordKind kind, std::uint64_t number, std::string_view text) {
-    last_.kind = kind;
-    last_.number = number;
-    last_.text = text;
-  }
-  // Those of sources, in the order in which they stand in the file.
+  // In the order in which they stand in the file.
   [[nodiscard]] std::vector<PassedEvent> take() {
     std::vector<PassedEvent> all;
-    for (auto& [source, event] : of_sources_) all.push_back(std::move(event));
+    for (auto& [source, events] : of_sources_) {
+      for (PassedEvent* const each : {&events.arrival, &events.deactivation}) {
+        if (each->number != 0) all.push_back(std::move(*each));
+      }
+    }
     of_sources_.clear();
     std::sort(all.begin(), all.end(),
               [](const auto& one, const auto& other) { return one.number < other.number; });
     return all;
   }
-  [[nodiscard]] PassedEvent take_last() { return std::exchange(last_, {}); }
 
  private:
-  std::map<std::string, PassedEvent, std::less<>> of_sources_;
-  PassedEvent last_;
+  struct OfSource {
+    PassedEvent arrival;
+    PassedEvent deactivation;
+  };
+  std::map<std::string, OfSource, std::less<>> of_sources_;
 };
 
 // Whether what it says of a source may rest on the events before it.
@@ -87,7 +93,6 @@ class Reading {
     };
     result_.end = recording::read_mcap(path_, visitor);
     hand_on_passed();
-    hand_on_last();
     hand_on();
     if (!has_metadata_) refuse();
     return std::move(result_);
@@ -161,7 +166,6 @@ class Reading {
     ++result_.records;
     if (is_event && pass_over(kind->second, message, text)) return;
     if (rests_on_events(kind->second)) hand_on_passed();
-    hand_on_last();
     read(kind->second, text, result_.records);
   }
 
@@ -169,13 +173,12 @@ class Reading {
     const auto time = static_cast<Nanoseconds>(message.log_time -
                                                static_cast<std::uint64_t>(result_.wall_offset));
     if (events_.has(time)) return false;
-    if (time >= events_.to) {
-      passed_.put_last(kind, result_.records, text);
-      return true;
-    }
     const auto source = quoted_source(text);
-    if (source) passed_.put(*source, kind, result_.records, text);
-    return source.has_value();
+    if (!source) return false;
+    const bool is_behind = time >= events_.to;
+    if (std::exchange(is_behind_, is_behind) != is_behind) hand_on_passed();
+    passed_.put(*source, kind, result_.records, text);
+    return true;
   }
 
   void read(RecordKind kind, std::string_view text, std::uint64_t number) {
@@ -191,10 +194,6 @@ class Reading {
 
   void hand_on_passed() {
     for (const PassedEvent& each : passed_.take()) read(each.kind, each.text, each.number);
-  }
-  void hand_on_last() {
-    const PassedEvent last = passed_.take_last();
-    if (last.number != 0) read(last.kind, last.text, last.number);
   }
 
   // It stands directly behind its arrival.
@@ -226,6 +225,7 @@ class Reading {
   std::optional<Record> waiting_;
   const TimeSpan events_;
   PassedEvents passed_;
+  bool is_behind_ = false;  // the part: those that were passed over last
 };
 
 }  // namespace

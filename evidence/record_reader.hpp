@@ -26,8 +26,8 @@ enum class Payloads : std::uint8_t { pass_over, read };
 
 // Calls `use` for each record, in the file's order, which for those of one source is the order in
 // which they happened. Of arrivals and deactivations outside `events`, which are passed over faster
-// than others are read: before it, the last of each source that stands in front of what may rest on
-// it; behind it, the last of those that stand one behind another. Throws McapError, RecordError.
+// than others are read, only those that decide what a source is like in front of what may rest on
+// it: its last arrival, and a deactivation behind that. Throws McapError, RecordError.
 ReadRecording read_recording(const std::string& path, Payloads payloads,
                              const std::function<void(Record&&)>& use,
                              const recording::Watch& watch = {}, const TimeSpan& events = {});

@@ -93,6 +93,11 @@ class Loader {
         run.decisions, [](const Decision& each) { return each.step >= each.source->steps.size(); });
   }
 
+  // Behind the first step beyond it, decisions of the part rest on none.
+  [[nodiscard]] bool is_past(const SourceHistory& history) const {
+    return !history.steps.empty() && history.steps.back().time >= known_until_;
+  }
+
   // Each takes effect after the one before. Of those that were over before the part began, nothing
   // rests on any but the last. Null: it lies beyond what decisions of the part rest on.
   SourceHistory* add_step(const SourceContext& context, Step step) {
@@ -101,7 +106,7 @@ class Loader {
       step.seen = std::max(step.seen, history.steps.back().seen);
     }
     run().end = std::max(run().end, step.seen);
-    if (step.time >= known_until_) return nullptr;
+    if (is_past(history)) return nullptr;
     if (step.seen < part_.from) history.steps.clear();
     history.steps.push_back(step);
     return &history;
@@ -132,6 +137,7 @@ class Loader {
     SourceHistory& history = run().sources[each.context->source];
     if (part_.has(each.seen)) run().lost += each.lost;
     run().end = std::max(run().end, each.seen);
+    if (is_past(history)) return;
     const bool is_known = !history.steps.empty() && history.word == each.word;
     // It is tapped now; the step below stands behind the gap.
     if (each.why != SourceState::Why::page) history.unknown_from = shm::kForever;

@@ -192,6 +192,63 @@ TEST(PartOfARecording, DoesNotJudgeADecisionThatWasSeenMuchLater) {
   EXPECT_EQ(counts_of(read_part(incident, {1200, shm::kForever})), (Counts{1, 1, 0, 0, 0, 0}));
 }
 
+constexpr shm::Nanoseconds kLongAfter = 60'000 * kMs;
+
+Counts counts_at_1500(Incident& incident) { return counts_of(read_part(incident, {1500, 1600})); }
+
+// A component that comes anew does not know when its predecessor's arrivals were.
+TEST(PartOfARecording, DoesNotDoubtWhatCameBeforeAComponentCameAnew) {
+  Incident incident;
+  incident.arrive("/high", 1010, 1011, Fate::accepted);
+  incident.arrive("/low", 1550, 1551, Fate::accepted);
+  incident.arrive("/high", kLongAfter, kLongAfter + 1, Fate::accepted);
+  incident.arrive("/low", kLongAfter + 2, kLongAfter + 3, Fate::discarded);
+  incident.state("/high", 0, kLongAfter + 20, shm::arrival(kLongAfter, 500),
+                 evidence::SourceState::Why::joined);
+  EXPECT_EQ(counts_at_1500(incident), (Counts{1, 0, 0, 0, 0, 0}));
+}
+
+// What was not told until long after the part stays unknown in it.
+TEST(PartOfARecording, DoesNotKnowWhatCouldNotBeTapped) {
+  Incident incident;
+  evidence::Missed refused;
+  refused.source = "/high";
+  refused.from = refused.to = 1010;
+  refused.why = evidence::Missed::Why::refused;
+  incident.add(refused);
+  incident.arrive("/low", 1550, 1551, Fate::discarded);
+  incident.state("/high", kLongAfter, kLongAfter + 20, shm::arrival(kLongAfter, 500),
+                 evidence::SourceState::Why::joined);
+  EXPECT_EQ(counts_at_1500(incident), (Counts{0, 0, 0, 1, 0, 0}));
+}
+
+// As what closes says, which is no news then.
+TEST(PartOfARecording, KnowsSinceWhenASourceWasDeactivated) {
+  constexpr shm::Nanoseconds kFrom = 30'000 * kMs;
+  Incident incident;
+  incident.deactivate("/high", 1010, 1011);
+  incident.state("/low", 0, 1012, shm::kNeverActive);
+  incident.arrive("/high", 1020, 1021, Fate::accepted);
+  incident.deactivate("/high", 1030, 1031);
+  incident.deactivate("/high", 1040, 1041);
+  incident.arrive("/low", kFrom + 10, kFrom + 11, Fate::accepted);
+  incident.state("/high", 1040, kFrom + 20, shm::deactivation(1030),
+                 evidence::SourceState::Why::closed);
+  EXPECT_EQ(counts_of(read_part(incident, {kFrom, kFrom + 100})), (Counts{1, 0, 0, 0, 0, 0}));
+}
+
+// Where nothing stands between the two.
+TEST(PartOfARecording, KnowsWhoWasActiveBeforeWhatCameBehindIt) {
+  constexpr shm::Nanoseconds kFrom = 30'000 * kMs;
+  Incident incident(slowed(kOverride));
+  incident.arrive("/high", 15'000 * kMs, 15'000 * kMs, Fate::accepted, kT);
+  incident.arrive("/high", 2 * kLongAfter, 2 * kLongAfter, Fate::accepted, kT);
+  evidence::Models models(compile_texts);
+  std::ostringstream trace;
+  evidence::write_trace(read_part(incident, {kFrom, kFrom + 100}), models, trace);
+  EXPECT_EQ(trace.str(), "t_ns,source,event\n15000000000,/high,arrive\n");
+}
+
 TEST(PartOfARecording, LeavesOutRunsThatLieOutside) {
   Incident incident;
   incident.arrive("/low", 1010, 1011, Fate::accepted);
