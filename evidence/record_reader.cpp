@@ -70,6 +70,9 @@ class PassedEvents {
   std::map<std::string, OfSource, std::less<>> of_sources_;
 };
 
+// What is longer is read at once, for of that little is kept: names are shorter.
+constexpr std::size_t kMostKept = 4096;
+
 // Whether what it says of a source may rest on the events before it.
 bool rests_on_events(RecordKind kind) {
   return kind != RecordKind::kWinner && kind != RecordKind::kPort && kind != RecordKind::kModel;
@@ -172,7 +175,7 @@ class Reading {
   bool pass_over(RecordKind kind, const recording::McapMessage& message, std::string_view text) {
     const auto time = static_cast<Nanoseconds>(message.log_time -
                                                static_cast<std::uint64_t>(result_.wall_offset));
-    if (events_.has(time)) return false;
+    if (events_.has(time) || text.size() > kMostKept) return false;
     const auto source = quoted_source(text);
     if (!source) return false;
     const bool is_behind = time >= events_.to;

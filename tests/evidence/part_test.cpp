@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <array>
+#include <map>
+#include <memory>
 #include <random>
 #include <set>
 #include <sstream>
@@ -12,6 +14,7 @@
 
 #include "evidence/comparison.hpp"
 #include "evidence/export.hpp"
+#include "evidence/record_reader.hpp"
 #include "evidence/verification.hpp"
 #include "tests/evidence/incident.hpp"
 
@@ -247,6 +250,33 @@ TEST(PartOfARecording, KnowsWhoWasActiveBeforeWhatCameBehindIt) {
   std::ostringstream trace;
   evidence::write_trace(read_part(incident, {kFrom, kFrom + 100}), models, trace);
   EXPECT_EQ(trace.str(), "t_ns,source,event\n15000000000,/high,arrive\n");
+}
+
+// A file that was made to do harm would fill the memory with it.
+TEST(PartOfARecording, DoesNotKeepLongTexts) {
+  Incident incident;
+  for (int i = 0; i < 3; ++i) {
+    evidence::Arrival arrival;
+    auto context = std::make_shared<evidence::SourceContext>();
+    context->source = "/long";
+    for (int port = 0; port < 64; ++port) {
+      context->destinations.push_back("/" + std::string(100, 'p') + std::to_string(port));
+    }
+    arrival.context = std::move(context);
+    arrival.time = arrival.seen = 1100 + i;
+    arrival.masks.accepted = ~std::uint64_t{0};
+    incident.add(arrival);
+  }
+  incident.arrive("/low", 1200, 1201, Fate::accepted);
+  incident.arrive("/low", 1202, 1203, Fate::accepted);
+  std::map<std::string, int> arrivals;
+  const auto use = [&](evidence::Record&& record) {
+    if (!std::holds_alternative<evidence::Arrival>(record)) return;
+    ++arrivals[evidence::context_of(record)->source];
+  };
+  evidence::read_recording(incident.file(), evidence::Payloads::pass_over, use, {},
+                           {kLongAfter, shm::kForever});
+  EXPECT_EQ(arrivals, (std::map<std::string, int>{{"/long", 3}, {"/low", 1}}));
 }
 
 TEST(PartOfARecording, LeavesOutRunsThatLieOutside) {
