@@ -167,7 +167,10 @@ class Reading {
     const bool is_event =
         kind->second == RecordKind::kArrival || kind->second == RecordKind::kDeactivation;
     ++result_.records;
-    if (is_event && pass_over(kind->second, message, text)) return;
+    if (is_event && pass_over(kind->second, message, text)) {
+      hand_on();
+      return;
+    }
     if (rests_on_events(kind->second)) hand_on_passed();
     read(kind->second, text, result_.records);
   }

@@ -279,6 +279,26 @@ TEST(PartOfARecording, DoesNotKeepLongTexts) {
   EXPECT_EQ(arrivals, (std::map<std::string, int>{{"/long", 3}, {"/low", 1}}));
 }
 
+// Who replays it waits for nothing of what stands behind it.
+TEST(PartOfARecording, IsHandedOnBeforeWhatIsBehindItHasBeenRead) {
+  Incident incident;
+  incident.arrive("/low", 1550, 1551, Fate::accepted);
+  for (int i = 0; i < 20'000; ++i) {
+    incident.arrive("/low", kLongAfter + i, kLongAfter + i + 1, Fate::accepted);
+  }
+  std::uint64_t at = 0;
+  std::uint64_t handed_on_at = 0;
+  const auto use = [&](evidence::Record&& record) {
+    const auto* arrival = std::get_if<evidence::Arrival>(&record);
+    if (arrival != nullptr && arrival->time == 1550) handed_on_at = at;
+  };
+  evidence::read_recording(incident.file(), evidence::Payloads::read, use,
+                           [&](std::uint64_t done, std::uint64_t /*all*/) { at = done; },
+                           {1500, 1600});
+  EXPECT_GT(handed_on_at, 0u);
+  EXPECT_LT(handed_on_at, at / 2);
+}
+
 TEST(PartOfARecording, LeavesOutRunsThatLieOutside) {
   Incident incident;
   incident.arrive("/low", 1010, 1011, Fate::accepted);
