@@ -251,7 +251,10 @@ std::optional<Mention> ElementReader::port_name(const Text& text, std::string_vi
   const auto start = static_cast<std::size_t>(name.data() - text.bytes().data());
   if (auto problem = find_problem_in_port(name)) {
     const std::size_t at = start + problem->at;
-    error(std::move(problem->code), text.where(at), problem->message + text.origin(at));
+    const std::string define = text.define_of(start, start + name.size());
+    if (define.empty() || defines_.tells_fault_of(define)) {
+      error(std::move(problem->code), text.where(at), problem->message + text.origin(at));
+    }
     return {};
   }
   return Mention{std::string(name), text.where(start), text.define_of(start, start + name.size())};

@@ -69,13 +69,28 @@ std::size_t Hierarchy::look_up(const Mention& mention) const {
   } else if (mention.name.find('*') != std::string::npos || mention.name == "all") {
     advice = "; each is named by itself, or all that are in one meta-behaviour by its name";
   } else if (advice.empty()) {
-    advice = advise(mention.name, known,
-                    "define it, correct the name, or give the file that has it as well");
+    const std::string longer = known.empty() ? "" : longer_name(mention.name);
+    advice =
+        advise(mention.name, known,
+               longer.empty() ? "define it, correct the name, or give the file that has it as well"
+                              : "did you mean " + quote(longer) + "?");
   }
   diagnostics_.error("unknown-name", mention.where,
                      "no behaviour has the name " + quote(mention.name) + advice,
                      {.behaviour = mention.name});
   return kNobody;
+}
+
+// The only behaviour whose name has this one among its words; empty: there is none, or several.
+std::string Hierarchy::longer_name(const std::string& name) const {
+  std::string_view found;
+  const std::string words = ' ' + lower_case(name) + ' ';
+  for (const Behaviour& each : model_.behaviours) {
+    if ((' ' + lower_case(each.name) + ' ').find(words) == std::string::npos) continue;
+    if (!found.empty()) return {};
+    found = each.name;
+  }
+  return std::string(found);
 }
 
 // Where a source stands in the place of a behaviour's name; empty: it is none.
@@ -251,6 +266,8 @@ bool Hierarchy::may_inhibit(std::size_t inhibitor, std::size_t inhibited, const 
   if (parents_[inhibitor] == parents_[inhibited]) return true;
   const bool is_orphan = parents_[inhibitor] == kNobody || parents_[inhibited] == kNobody;
   if (is_orphan && lacks_parents_) return false;
+  const std::size_t parent = std::min(parents_[inhibitor], parents_[inhibited]);  // kNobody is last
+  if (is_orphan && doubts_[parent].of_parts) return false;  // it may be the child that is misspelt
   diagnostics_.error("not-a-sibling", mention.where,
                      quote(name) + " cannot inhibit " + quote(mention.name) +
                          ", for only behaviours in the same meta-behaviour can: the one " +

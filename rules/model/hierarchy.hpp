@@ -69,6 +69,7 @@ class Hierarchy {
   void doubt_place(std::size_t behaviour);
   // The behaviour of that name; kNobody, reported, if there is none.
   [[nodiscard]] std::size_t look_up(const Mention& mention) const;
+  [[nodiscard]] std::string longer_name(const std::string& name) const;
   [[nodiscard]] std::string advice_on_source(const std::string& name) const;
   [[nodiscard]] std::string as_list(std::string_view text) const;
   [[nodiscard]] std::string describe_place(std::size_t behaviour) const;

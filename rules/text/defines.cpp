@@ -111,6 +111,11 @@ std::string_view Defines::later_file_with(std::string_view name) const {
   return {};
 }
 
+bool Defines::tells_fault_of(const std::string& name) {
+  const auto define = defines_.find(name);
+  return define != defines_.end() && !std::exchange(define->second.is_faulty, true);
+}
+
 void Defines::note_unused(Diagnostics& diagnostics) const {
   for (const auto& [name, define] : defines_) {
     if (define.is_used) continue;

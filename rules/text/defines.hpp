@@ -42,6 +42,10 @@ class Defines {
   // Empty where something is wrong, which was then reported.
   std::optional<Text> expand(const Text& text, Diagnostics& diagnostics);
 
+  // Whether what is wrong with the whole of its text is told for the first time: that is told at
+  // one of its uses. Of a name that is none, false.
+  bool tells_fault_of(const std::string& name);
+
   // Notes "unused-define". To be asked behind the last text: no text may have been refused, since
   // it may have had the use.
   void note_unused(Diagnostics& diagnostics) const;
@@ -51,6 +55,7 @@ class Defines {
     std::optional<std::string> value;
     Location where;
     bool is_used = false;  // or need not be
+    bool is_faulty = false;
   };
   // The define that a use names, or nothing, reported.
   const std::string* look_up(const std::string& name, const Text& text, std::size_t at,

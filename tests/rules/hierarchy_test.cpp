@@ -112,6 +112,9 @@ TEST(Hierarchy, NamesMustBeKnownAndUnique) {
       {{"A>b; B", "B"}, "1:59 error unknown-name", "\"b; B\"; names are separated by commas"},
       {{"A>*", "B"}, "1:59 error unknown-name", "\"*\"; each is named by itself, or all that are"},
       {{"A>all", "B"}, "1:59 error unknown-name", "\"all\"; each is named by itself"},
+      {{"M[A Bee]", "A>Beta", "Beta"},
+       "1:57 error unknown-name",
+       "no behaviour has the name \"Bee\""},
       {{"A>Zulu"}, "1:59 error unknown-name", "define it, correct the name, or give the file"},
       {{"A>/B", "B"},
        "1:59 error unknown-name",
@@ -136,6 +139,21 @@ TEST(Hierarchy, NamesMustBeKnownAndUnique) {
     EXPECT_THAT(loaded.findings(), ElementsAre(c.finding)) << model(c.behaviours);
     EXPECT_THAT(loaded.message(), HasSubstr(c.message));
   }
+}
+
+TEST(Hierarchy, OfANameThatLacksAWordTheWholeOneIsProposed) {
+  const auto message = [](const std::string& inhibited) {
+    return load_text("<behavior name='A'><config at='/p'>/a</config><inhibition>" + inhibited +
+                     "</inhibition></behavior>"
+                     "<behavior name='Look Around'><config at='/p'>/b</config></behavior>"
+                     "<behavior name='Follow Face'><config at='/p'>/c</config></behavior>"
+                     "<behavior name='Follow Wall'><config at='/p'>/d</config></behavior>")
+        .message();
+  };
+  EXPECT_THAT(message("around"), HasSubstr("did you mean \"Look Around\"?"));
+  EXPECT_THAT(message("Look"), HasSubstr("did you mean \"Look Around\"?"));
+  EXPECT_THAT(message("Loo"), HasSubstr("; define it"));
+  EXPECT_THAT(message("Follow"), HasSubstr("; define it"));
 }
 
 TEST(Hierarchy, ASecondPlaceIsNamedWithFileLineAndColumn) {

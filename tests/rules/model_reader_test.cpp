@@ -279,6 +279,9 @@ TEST(ModelReader, NamesThatAreNoneAreErrors) {
        "the output port is empty"},
       {"<behavior name='B'><config at=''>/s</config></behavior>", "1:32 error empty-name",
        "the attribute \"at\" is empty"},
+      {"<define name='p'>p</define>\n"
+       "<behavior name='B'><config at='${p}'>/s</config><config at='${p}'>/t</config></behavior>",
+       "2:32 error invalid-port-name", "write \"/p\" for \"p\" (in the text of ${p})"},
       {"<behavior name='B'>\n<config at=' p'>/s</config></behavior>",
        "2:14 error invalid-port-name", "write \"/p\" for \"p\""},
       {"<behavior name='B'>\n<config at='/p'>\n /s /t </config></behavior>",
