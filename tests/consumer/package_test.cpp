@@ -35,8 +35,10 @@ struct Package {
 
   explicit Package(const std::string& directory)
       : root(directory + "/root"), control(directory + "/control") {
-    output_of({"/usr/bin/cpack", "--config", CONSUMER_BUILD "/CPackConfig.cmake", "-D",
-               "CPACK_DEBIAN_COMPRESSION_TYPE=gzip", "-B", directory});
+    // By somebody who lets nobody read what he makes.
+    output_of({"/bin/sh", "-c", "umask 077; exec \"$@\"", "sh", "/usr/bin/cpack", "--config",
+               CONSUMER_BUILD "/CPackConfig.cmake", "-D", "CPACK_DEBIAN_COMPRESSION_TYPE=gzip",
+               "-B", directory});
     for (const auto& each : fs::directory_iterator(directory)) {
       if (each.path().extension() == ".deb") file = each.path();
     }
@@ -74,14 +76,16 @@ void expect_configuration(const Package& package) {
 }
 
 // -rw-r--r-- root/root ...
-void expect_only_root_to_write(const Package& package) {
+void expect_all_to_read_and_root_to_write(const Package& package) {
   std::istringstream lines(output_of({"/usr/bin/dpkg-deb", "--contents", package.file}));
   std::size_t files = 0;
   for (std::string line; std::getline(lines, line); ++files) {
     EXPECT_THAT(line, HasSubstr(" root/root "));
     if (line[0] == 'l') continue;
-    EXPECT_EQ(line[5], '-') << line;
-    EXPECT_EQ(line[8], '-') << line;
+    const bool is_directory = line[0] == 'd';
+    EXPECT_EQ(line.substr(4, 2), "r-") << line;
+    EXPECT_EQ(line.substr(7, 2), "r-") << line;
+    EXPECT_TRUE(!is_directory || line[9] == 'x') << line;
   }
   EXPECT_GT(files, 50u);
 }
@@ -94,6 +98,36 @@ void expect_scripts(const Package& package) {
   }
 }
 
+// systemd may refuse to reload, as where /run is full: dpkg must not stop at that.
+TEST(DebianPackage, IsInstalledAndRemovedWhereSystemdRefuses) {
+  const TemporaryDirectory directory;
+  fs::permissions(directory.write("systemctl", "#!/bin/sh\nexit 1\n"), fs::perms(0755));
+  fs::permissions(directory.write("systemd-sysusers", "#!/bin/sh\n"), fs::perms(0755));
+  // There systemd runs.
+  const std::string begin =
+      "mount -t tmpfs none /run && mkdir -p /run/systemd/system && exec \"$@\"";
+  const auto run = [&](const std::vector<std::string>& command) {
+    std::vector<std::string> all{"/usr/bin/unshare",
+                                 "-rm",
+                                 "/bin/sh",
+                                 "-c",
+                                 begin,
+                                 "sh",
+                                 "/usr/bin/env",
+                                 "PATH=" + directory.path() + ":/usr/bin:/bin"};
+    all.insert(all.end(), command.begin(), command.end());
+    return run_program(all);
+  };
+  if (run({"/bin/true"}).exit_code != 0) GTEST_SKIP() << "no namespace of its own";
+  EXPECT_NE(run({"systemctl"}).exit_code, 0);
+  using Command = std::vector<std::string>;
+  for (const Command& each : {Command{"postinst", "configure"}, Command{"prerm", "remove"},
+                              Command{"postrm", "remove"}, Command{"postrm", "purge"}}) {
+    const auto result = run({CONSUMER_PACKAGING "/" + each[0], each[1]});
+    EXPECT_EQ(result.exit_code, 0) << each[0] << ' ' << each[1] << '\n' << result.err;
+  }
+}
+
 // To make it takes longer than all that is asked of it.
 TEST(DebianPackage, IsWhatASystemInstalls) {
   const TemporaryDirectory directory;
@@ -101,7 +135,7 @@ TEST(DebianPackage, IsWhatASystemInstalls) {
   ASSERT_FALSE(testing::Test::HasFailure());
   expect_files_of_a_system(package);
   expect_configuration(package);
-  expect_only_root_to_write(package);
+  expect_all_to_read_and_root_to_write(package);
   expect_scripts(package);
   EXPECT_EQ(package.field("Package"), "arbiter\n");
   EXPECT_THAT(package.field("Depends"),
