@@ -89,8 +89,7 @@ TEST(TimeOrder, WhatAPageSaysStandsBehindWhatWasBefore) {
 
 // An operator has deactivated the source while nobody had it open: that is read later.
 TEST(TimeOrder, ADeactivationByAnOperatorStandsAtItsTime) {
-  using Why = evidence::SourceState::Why;
-  for (const Why why : {Why::page, Why::joined}) {
+  for (const auto why : {evidence::SourceState::Why::page, evidence::SourceState::Why::joined}) {
     recorder::TimeOrder order;
     std::vector<std::string> sources;
     const auto add = [&](auto record, const char* source) {
