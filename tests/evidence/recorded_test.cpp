@@ -46,7 +46,7 @@ TEST(LoadedRecording, IsReadWithoutMostArrivalsForTheWinnersAlone) {
   EXPECT_EQ(recorded.runs[0].winners.size(), 1u);
   EXPECT_EQ(recorded.runs[0].decisions.size(), 1u);
   EXPECT_EQ(recorded.runs[0].end, 1310);
-  EXPECT_EQ(recorded.runs[1].decisions.size(), 1u);
+  EXPECT_EQ(recorded.runs[1].decisions.size(), 2u) << "the last of each source";
   EXPECT_EQ(recorded.runs[1].end, 2021);
 }
 
