@@ -107,8 +107,10 @@ void Replayer::survey() {
 }
 
 void Replayer::survey(const Record& record) {
+  ++surveyed_;
   if (const auto* start = std::get_if<evidence::Start>(&record)) {
     if (first_ == 0) first_ = start->time;
+    if (start->time <= options_.part.from) forget_who_was_active();
   } else if (const auto* model = std::get_if<evidence::ModelChange>(&record)) {
     if (!model_ || model->time <= options_.part.from) model_ = *model;
   }
@@ -140,6 +142,11 @@ void Replayer::survey(const Record& record) {
   }
 }
 
+// Another daemon, with memory of its own, does not know it.
+void Replayer::forget_who_was_active() {
+  for (auto& [name, source] : sources_) source.word = source.at_start = shm::kNeverActive;
+}
+
 // What was before the part is how it is as that begins.
 void Replayer::note_event(Source& source, Nanoseconds time, evidence::ActivityWord word) {
   source.word = word;
@@ -148,6 +155,7 @@ void Replayer::note_event(Source& source, Nanoseconds time, evidence::ActivityWo
   } else if (options_.part.has(time)) {
     source.has_events = true;
     latest_ = std::max(latest_, time);
+    last_event_ = surveyed_;
   }
 }
 
@@ -239,17 +247,19 @@ void Replayer::open_ports() {
 Replayed Replayer::run(const shm::FileDescriptor& interrupts) {
   Replayed replayed;
   replayed.sources = sources_.size();
+  std::uint64_t read = 0;
   const auto use = [&](Record&& record) {
     const auto* context = evidence::context_of(record);
     const bool is_event = std::holds_alternative<Arrival>(record) ||
                           std::holds_alternative<evidence::Deactivation>(record);
     const Nanoseconds time = evidence::time_of(record);
-    if (is_past(time)) throw Past();
-    if (!is_event || !options_.part.has(time) || sources_.count(context->source) == 0) return;
-    begin(interrupts);
-    deactivate_untold(time, interrupts, replayed);
-    await(time, interrupts);
-    publish(record, replayed);
+    if (is_event && options_.part.has(time) && sources_.count(context->source) != 0) {
+      begin(interrupts);
+      deactivate_untold(time, interrupts, replayed);
+      await(time, interrupts);
+      publish(record, replayed);
+    }
+    if (++read >= last_event_) throw Past();
   };
   try {
     try {
@@ -263,12 +273,6 @@ Replayed Replayer::run(const shm::FileDescriptor& interrupts) {
   }
   if (has_begun_) replayed.time = shm::monotonic_now() - start_;
   return replayed;
-}
-
-// Nothing of the part stands so far behind it.
-bool Replayer::is_past(Nanoseconds recorded) const {
-  constexpr Nanoseconds kLate = 10'000'000'000;
-  return recorded >= kLate && recorded - kLate >= options_.part.to;
 }
 
 // With the first event: to come to a part takes time.

@@ -90,6 +90,7 @@ class Replayer {
   void survey();
   void survey(const evidence::Record& record);
   void survey(const evidence::SourceState& state, Source& source);
+  void forget_who_was_active();
   void note_event(Source& source, Nanoseconds time, evidence::ActivityWord word);
   void choose();
   [[nodiscard]] bool is_at_chosen_port(const std::string& source) const;
@@ -97,7 +98,6 @@ class Replayer {
   void refuse_without_payloads(const Excepted& is_excepted) const;
   void open_port(const std::string& name, Source& source);
   void open_ports();
-  [[nodiscard]] bool is_past(Nanoseconds recorded) const;
   void begin(const shm::FileDescriptor& interrupts);
   void signal_active_ones();
   void signal_active(Source& source, Nanoseconds arrived);
@@ -117,6 +117,9 @@ class Replayer {
   std::size_t next_untold_ = 0;
   Nanoseconds first_ = 0;   // of the recording, or of the part
   Nanoseconds latest_ = 0;  // of its arrivals and deactivations
+  // Records. Late news of the part may stand far behind it.
+  std::uint64_t surveyed_ = 0;
+  std::uint64_t last_event_ = 0;  // the number of the last that is of the part
   std::optional<Node> node_;
   bool keeps_times_ = false;
   bool has_begun_ = false;

@@ -138,6 +138,44 @@ TEST_F(PartOfTheTools, IsReplayed) {
               HasSubstr("10 samples, 0 signals and 0 deactivations of 1 source in "));
 }
 
+ProgramResult replayed_from_1_to_3(const std::string& file) {
+  Daemon daemon(kLasting);
+  return run_program({"/usr/bin/env", "TZ=UTC", ARBITER_PROGRAMS "/arbiter", "replay", file,
+                      "--as-fast-as-possible", "--instance", daemon.instance(), "--from",
+                      "00:00:01", "--to", "00:00:03"});
+}
+
+// Its publisher was stopped for long before it could tell of it.
+TEST(ReplayOfAPart, HasWhatWasToldLate) {
+  Incident incident;
+  const shm::Nanoseconds told = 30 * kInSecond;
+  incident.arrive("/low", 2 * kInSecond, 2 * kInSecond + 1, Incident::Fate::accepted);
+  incident.put_payload(8);
+  incident.state("/low", 2 * kInSecond, told, shm::arrival(2 * kInSecond, 500),
+                 evidence::SourceState::Why::closed);
+  incident.state("/low", told - 1, told, shm::arrival(told - 1, 500));
+  incident.deactivate("/low", told, told + 1);
+  incident.state("/high", told, told, shm::kNeverActive, evidence::SourceState::Why::joined);
+  incident.arrive("/high", 2 * kInSecond + 10, told, Incident::Fate::discarded);
+  incident.put_payload(8);
+  EXPECT_THAT(replayed_from_1_to_3(incident.file()).out,
+              HasSubstr("2 samples, 0 signals and 0 deactivations of 2 sources in "));
+}
+
+// With memory of its own, that did not know the source.
+TEST(ReplayOfAPart, DoesNotBeginWithWhoWasActiveUnderADaemonBefore) {
+  Incident incident;
+  incident.arrive("/high", 2000, 2001, Incident::Fate::accepted, shm::kForever);
+  incident.put_payload(8);
+  incident.add(evidence::Start{3000, "test", {}, "none"});
+  incident.state("/low", 0, 3000, shm::kNeverActive);
+  incident.put_in_force(kOverride, 1, 2900);
+  incident.arrive("/low", 2 * kInSecond, 2 * kInSecond + 1, Incident::Fate::accepted);
+  incident.put_payload(8);
+  EXPECT_THAT(replayed_from_1_to_3(incident.file()).out,
+              HasSubstr("1 sample, 0 signals and 0 deactivations of 1 source in "));
+}
+
 TEST_F(PartOfTheTools, HasItsWinners) {
   const std::string low = "1970-01-01 00:00:01.000  /p  /low ";
   const std::string high = "1970-01-01 00:00:20.000  /p  /high ";
