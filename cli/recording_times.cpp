@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdio>
 #include <ctime>
+#include <limits>
 #include <optional>
 
 #include <CLI/CLI.hpp>
@@ -49,6 +50,24 @@ std::optional<shm::Nanoseconds> fraction_of(const char* rest) {
   return std::stoll(digits + std::string(9 - digits.size(), '0'));
 }
 
+// That time of a day: the first in the recording, or else the nearest to it, which may be of the
+// day before or behind.
+std::time_t in_or_beside(const std::tm& time, std::time_t begin, std::time_t end) {
+  std::time_t nearest = 0;
+  std::time_t least = std::numeric_limits<std::time_t>::max();
+  for (const int day : {-1, 0, 1}) {
+    std::tm parts = time;
+    parts.tm_mday += day;
+    const std::time_t second = std::mktime(&parts);
+    const std::time_t distance =
+        second + 1 <= begin ? begin - second : std::max(second - end, std::time_t{0});
+    if (distance >= least) continue;
+    nearest = second;
+    least = distance;
+  }
+  return nearest;
+}
+
 }  // namespace
 
 std::string since_first(const Recorded& recorded, shm::Nanoseconds time) {
@@ -81,13 +100,8 @@ TimeSpan read_time(const std::string& option, const std::string& text,
     const auto fraction = rest == nullptr ? std::nullopt : fraction_of(rest);
     if (!fraction) continue;
     parts.tm_isdst = -1;
-    std::tm day_after = parts;
-    ++day_after.tm_mday;
     std::time_t second = std::mktime(&parts);
-    if (format[1] == 'H' && second + 1 <= begin) {
-      const std::time_t next = std::mktime(&day_after);
-      if (next <= end) second = next;
-    }
+    if (format[1] == 'H') second = in_or_beside(parts, begin, end);
     // No year is too far away to be counted in nanoseconds.
     second = std::clamp(second, begin - 10, end + 10);
     const shm::Nanoseconds from = second * kWholeSecond + *fraction - wall_offset;

@@ -51,8 +51,10 @@ class PartOfTheTools : public testing::Test {
   }
 
   [[nodiscard]] ProgramResult tool(std::vector<std::string> arguments,
-                                   const std::vector<std::string>& part) const {
-    arguments.insert(arguments.begin(), {"/usr/bin/env", "TZ=UTC", ARBITER_PROGRAMS "/arbiter"});
+                                   const std::vector<std::string>& part,
+                                   const std::string& zone = "UTC") const {
+    arguments.insert(arguments.begin(),
+                     {"/usr/bin/env", "TZ=" + zone, ARBITER_PROGRAMS "/arbiter"});
     arguments.insert(arguments.end(), part.begin(), part.end());
     return run_program(arguments);
   }
@@ -136,6 +138,21 @@ TEST_F(PartOfTheTools, IsReplayed) {
   EXPECT_FALSE(in.take());
   EXPECT_THAT(tool({"replay", file_, "--as-fast-as-possible"}, {"--from", "00:00:50"}).out,
               HasSubstr("10 samples, 0 signals and 0 deactivations of 1 source in "));
+}
+
+// Of those that are not in it, the nearest.
+TEST_F(PartOfTheTools, BeginsAndEndsOnTheDaysThatFit) {
+  EXPECT_THAT(simulated({"--from", "23:59:00", "--to", "00:00:10"}).out,
+              HasSubstr("\n9 decisions: 9 equal,"));
+  // There the day ends in the middle of the recording.
+  const auto expect = [&](const std::vector<std::string>& part, const std::string& text) {
+    const auto result = tool({"simulate", "--recording", file_}, part, "XXX-23:59:30");
+    EXPECT_THAT(result.out + result.err, HasSubstr(text));
+  };
+  expect({"--from", "23:59:50", "--to", "00:00:10"}, "\n30 decisions: 30 equal,");
+  expect({"--from", "23:59:50", "--to", "00:05:00"}, "\n50 decisions: 50 equal,");
+  expect({"--from", "00:05:00"}, "--from: \"00:05:00\" is not in the recording");
+  expect({"--from", "23:59:50", "--to", "23:59:40"}, "\"23:59:40\" is not after --from");
 }
 
 ProgramResult replayed_from_1_to_3(const std::string& file) {
