@@ -135,8 +135,11 @@ void Pipeline::follow(const Record& record) {
         winners_.read(state->context->source, state->word);
         break;
       case evidence::SourceState::Why::joined:
-        winners_.join(state->context->source, state->word);
-        break;
+        if (state->lost == 0) {
+          winners_.join(state->context->source, state->word);
+          break;
+        }
+        [[fallthrough]];  // of its last arrival nobody else tells
       case evidence::SourceState::Why::gap:
       case evidence::SourceState::Why::closed:
         winners_.apply(state->context->source, state->word, state->time, Why::state);

@@ -144,6 +144,13 @@ void TapReader::add_state(const TapEvent<>& event, Nanoseconds seen,
     add(records, Missed{state.context->source, last_, std::max(last_, state.time), state.lost, 0,
                         Missed::Why::overtaken, ""});
   }
+  // It had not been told of the tap, as where it began beside a daemon that had just taken over.
+  const Nanoseconds heard = std::max(last_, opened_);
+  if (state.why == SourceState::Why::joined && state.time > heard) {
+    state.lost = 1;
+    add(records,
+        Missed{state.context->source, heard, seen, 1, 0, Missed::Why::overtaken, kUnknownNumber});
+  }
   add(records, std::move(state));
 }
 

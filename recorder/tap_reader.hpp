@@ -19,8 +19,12 @@
 
 #include "recorder/record_queue.hpp"
 #include "recording/mcap.hpp"
+#include "shm/clock.hpp"
 
 namespace arbiter::recorder {
+
+// What a record of missing events says where these are at least one.
+inline constexpr const char* kUnknownNumber = "how many there were is not known";
 
 // What there is room for.
 enum class Room : std::uint8_t { all, no_payloads, none };
@@ -58,6 +62,7 @@ class TapReader {
       : tap_(std::move(tap)),
         with_payloads_(with_payloads),
         most_payload_(most_payload),
+        opened_(shm::monotonic_now()),
         told_(before) {}
 
   // The thread that polls.
@@ -104,7 +109,8 @@ class TapReader {
   evidence::ContextPtr context_;
   std::optional<LeftOut> left_out_;
   std::uint64_t arrivals_ = 0;
-  Nanoseconds last_ = 0;  // of what has happened, as far as has been told; 0: nothing has been
+  const Nanoseconds opened_;  // what was before is not to be told
+  Nanoseconds last_ = 0;      // of what has happened, as far as has been told; 0: nothing has been
   std::atomic<std::uint64_t> polled_{0};  // twice the number of polls, and 1 if a port is open
   std::atomic<evidence::ActivityWord> told_;
 };

@@ -242,8 +242,7 @@ void Watcher::open_tap(const std::string& source, Batch& batch) {
     const bool is_late = had_all_ != 0 && watched.next_try == 0 && word != shm::kNeverActive;
     if (!is_late) return;
     batch.add(evidence::Missed{source, had_all_, shm::monotonic_now(), 1, 0,
-                               evidence::Missed::Why::overtaken,
-                               "how often it had arrived when it was found is not known"});
+                               evidence::Missed::Why::overtaken, kUnknownNumber});
   } catch (const Error& error) {
     const bool is_known = watched.next_try != 0;
     watched.pause = std::clamp(2 * watched.pause, kTryAgainAfter, kTryAgainAtLeastEvery);

@@ -79,6 +79,37 @@ TEST(Record, SaysOnceWhyItCannotBeginAgain) {
   EXPECT_EQ(said.find(refusal), said.rfind(refusal)) << said;
 }
 
+// The daemon cannot tell the publisher of a tap that has not come back.
+TEST(Record, SaysThatItMissedWhatCameBesideADaemonThatDidNotKnowItsTaps) {
+  Daemon daemon(kLasting);
+  Node node("test");
+  auto in = node.input_port<int>("/p");  // with which it hands the memory back
+  Recording recording(daemon);
+  recording.process().stop();
+  daemon.kill();
+  daemon.restart();
+  auto low = node.output_port<int>("/low");
+  low.publish(1);
+  recording.process().resume();
+  recording.see("a daemon is there again");
+  await([&] { return daemon.taps_of("/low") == 1; });
+  low.publish(2);
+  EXPECT_EQ(recording.end(), 0) << recording.error();
+  const auto arrivals = recording.records<Arrival>();
+  ASSERT_EQ(arrivals.size(), 1u);
+  const auto missed = recording.records<evidence::Missed>();
+  ASSERT_EQ(missed.size(), 1u);
+  EXPECT_EQ(missed[0].source, "/low");
+  EXPECT_EQ(missed[0].events, 1u);
+  EXPECT_LT(missed[0].from, arrivals[0].time);
+  const auto shown = arbiter({"recording", "winners", "--json", recording.file()});
+  const json winners = json::parse(shown.out);
+  ASSERT_FALSE(winners.empty());
+  EXPECT_EQ(winners.back()["winner"], "/low");
+  EXPECT_LT(winners.back()["from_ns"], arrivals[0].time);
+  EXPECT_EQ(winners.back()["earliest_ns"], missed[0].from);
+}
+
 // What they do from then on, who obeys them does; and nothing tells the recorder of it.
 TEST(Record, SaysOfWhomItCannotRecordBehindADaemonThatDoesNotKnowThem) {
   Daemon daemon(kOverrideModel);
