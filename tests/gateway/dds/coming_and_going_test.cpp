@@ -242,6 +242,17 @@ TEST_P(DdsComingAndGoing, ALatchedSampleFromBeforeTheGatewayCameIsNoArrivalWhere
   EXPECT_EQ(latched.published("/Lock/pressed:o"), 0);
 }
 
+// It is asked for once the model says that what was before still holds.
+TEST_P(DdsComingAndGoing, ALatchedSampleFromBeforeIsTakenOnceTIsForever) {
+  LatchedLock latched("1000s", GetParam());
+  const DdsGateway gateway(latched.daemon, latched.domain, kLatchedLock);
+  gateway.see("samples published before are not taken, because T is not forever");
+  latched.lock.await("matched 2");
+  EXPECT_EQ(latched.published("/Lock/pressed:o"), 0);
+  latched.daemon.load(LatchedLock::model("forever"));
+  await([&] { return latched.published("/Lock/pressed:o") != 0; });
+}
+
 // A base that comes late to a topic that says what stays true, after the gateway has begun anew.
 TEST_P(DdsComingAndGoing, ALatchedTopicHasItsLastSampleAlsoAfterTheGatewayHasBegunAnew) {
   Drive drive("1000s", GetParam(), GetParam(), R"( qos="latched")");

@@ -317,6 +317,37 @@ TEST_F(Iceoryx, WhatItsQueueLosesIsCounted) {
   }
 }
 
+// RouDi gives up a process that it has not heard of for 1.5 s, and tells it nothing.
+TEST_F(Iceoryx, AWorkerThatWasHeldUpForTooLongIsReplaced) {
+  const Roudi roudi(directory_);
+  Spoken gate = gateway(directory_, in("low", "/Low:o") + out("/Base:i", "base"));
+  wait_for_description("/Low:o", "no publisher matched");
+  const pid_t worker = worker_of("/Low:o");
+  stop(worker);
+  const auto stopped = shm::monotonic_now();
+  wait_until([&] { return shm::monotonic_now() - stopped > 1'300'000'000; });
+  ::kill(worker, SIGCONT);
+  ASSERT_TRUE(gate.hear("the gateway was held up, so that RouDi may have given it up"));
+  wait_for_another_worker("/Low:o", worker);
+  expect_that_samples_pass();
+}
+
+// A publisher that keeps samples for who comes later gives them to who asks.
+TEST_F(Iceoryx, WhatWasPublishedBeforeTheGatewayCameNeverArrives) {
+  const Roudi roudi(directory_);
+  Spoken publisher = plain_publisher("low", 0, 8);
+  for (const char* text : {"one", "two"}) {
+    publisher.say(text);
+    ASSERT_TRUE(publisher.hear("published"));
+  }
+  Spoken gate = gateway(directory_, in("low", "/Low:o"));
+  wait_for_description("/Low:o", "1 publisher matched");
+  publisher.say("now");
+  wait_for_description("/Low:o", "the last sample has 3 bytes");
+  EXPECT_EQ(daemon_.source("/Low:o")["published"], 1);
+  EXPECT_EQ(described("/Low:o").find("late"), std::string::npos);
+}
+
 // A gateway that was stopped for longer than T discards what has waited meanwhile. On a machine
 // that is so slow that other samples are late, too, they are said again.
 TEST_F(Iceoryx, WhatHasWaitedForLongerThanTNeverArrives) {

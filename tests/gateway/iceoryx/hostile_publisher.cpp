@@ -5,8 +5,7 @@
 //
 // Each line of its standard input is a chunk: its payload, a blank, and what is written into its
 // header before it is published, such as "x size=4294967295 offset=12". HEADER: bytes of a user
-// header, "h" each. "flood" publishes without end, from then on. Says "ready" when it can publish,
-// and "published" after each line.
+// header, "h" each. Says "ready" when it can publish, and "published" after each line.
 #include <unistd.h>
 
 #include <cstddef>
@@ -36,7 +35,7 @@ class Publisher : public iox::popo::UntypedPublisher {
 struct Field {
   std::size_t offset, size;
 };
-const std::map<std::string, Field> kFields{
+const std::map<std::string, Field> fields{
     {"chunk", {0, 4}}, {"version", {4, 1}},    {"id", {6, 2}},     {"header", {24, 4}},
     {"size", {28, 4}}, {"alignment", {32, 4}}, {"offset", {36, 4}}};
 static_assert(sizeof(ChunkHeader) == 40);
@@ -47,9 +46,9 @@ iox::capro::IdString_t id(const char* text) {
 
 void write_field(ChunkHeader* chunk, const std::string& text) {
   const auto equals = text.find('=');
-  const auto field = kFields.find(text.substr(0, equals));
-  if (field == kFields.end()) throw std::runtime_error(text);
-  const std::uint64_t value = std::stoull(text.substr(equals + 1));
+  const auto field = fields.find(text.substr(0, equals));
+  if (field == fields.end()) std::exit(2);
+  const std::uint64_t value = std::strtoull(text.c_str() + equals + 1, nullptr, 10);
   std::memcpy(reinterpret_cast<char*>(chunk) + field->second.offset, &value, field->second.size);
 }
 
@@ -81,10 +80,7 @@ int main(int argc, char** argv) {
   Publisher publisher({id(argv[1]), id(argv[2]), id(argv[3])});
   std::cout << "ready" << std::endl;
   for (std::string line; std::getline(std::cin, line);) {
-    const bool floods = line.rfind("flood", 0) == 0;
-    do {
-      publish(publisher, floods ? line.substr(6) : line, header);
-    } while (floods);
+    publish(publisher, line, header);
     std::cout << "published" << std::endl;
   }
   return 0;

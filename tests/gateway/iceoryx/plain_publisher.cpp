@@ -1,8 +1,9 @@
 // A publisher of iceoryx that knows of nothing else: publishes each line of its standard input.
 //
-//   plain_publisher SERVICE INSTANCE EVENT [HEADER]
+//   plain_publisher SERVICE INSTANCE EVENT [HEADER [HISTORY]]
 //
 // A line is a payload; "#SIZE" stands for SIZE bytes "x". HEADER: bytes of a user header, "h" each.
+// HISTORY: so many are given to a subscriber that comes later and asks for them.
 // Says "ready" when it can publish, and "published" after each line.
 #include <unistd.h>
 
@@ -29,7 +30,9 @@ int main(int argc, char** argv) {
   const std::string name = "plain-publisher-" + std::to_string(::getpid());
   iox::runtime::PoshRuntime::initRuntime(
       iox::RuntimeName_t(iox::cxx::TruncateToCapacity, name.c_str()));
-  iox::popo::UntypedPublisher publisher({id(argv[1]), id(argv[2]), id(argv[3])});
+  iox::popo::PublisherOptions options;
+  options.historyCapacity = static_cast<std::uint64_t>(argc > 5 ? std::atoi(argv[5]) : 0);
+  iox::popo::UntypedPublisher publisher({id(argv[1]), id(argv[2]), id(argv[3])}, options);
   std::cout << "ready" << std::endl;
   for (std::string line; std::getline(std::cin, line);) {
     if (line.rfind('#', 0) == 0) line = std::string(std::stoul(line.substr(1)), 'x');

@@ -5,6 +5,7 @@
 
 #include <arbiter/arbiter.hpp>
 
+#include "shm/clock.hpp"
 #include "tests/gateway/iceoryx/scene.hpp"
 
 namespace arbiter::test {
@@ -64,7 +65,10 @@ TEST_F(Iceoryx, ARouDiThatHangsLaterIsToldAndWhatIsConnectedGoesOn) {
   ASSERT_TRUE(subscriber.hear("ready"));
   wait_for_description("/Low:o", "1 publisher matched");
   roudi.process.stop();
+  const auto stopped = shm::monotonic_now();
   wait_for_description("/Low:o", "RouDi does not answer");
+  // One that runs and is silent for so long has given the gateway up. This one has not.
+  wait_until([&] { return shm::monotonic_now() - stopped > 11'000'000'000; });
   publisher.say("x");
   EXPECT_EQ(subscriber.line(), "|x");
   // Whether it then gives up those whom it has not heard of, or not.
@@ -107,6 +111,20 @@ TEST_F(Iceoryx, AGatewayThatRouDiHasGivenUpBeginsAnew) {
   ASSERT_EQ(leave.process.wait(), 0);
   wait_for_another_worker("/Low:o", worker);
   expect_that_samples_pass();
+}
+
+// One that only receives touches none of its ends.
+TEST_F(Iceoryx, AGatewayThatRouDiHasGivenUpAndThatPublishesNothingBeginsAnew) {
+  const Roudi roudi(directory_);
+  Spoken gate = gateway(directory_, in("low", "/Low:o"));
+  wait_for_description("/Low:o", "no publisher matched");
+  const pid_t worker = worker_of("/Low:o");
+  Spoken leave(
+      {ARBITER_TESTS "/plain_iceoryx_leave", "arbiter-gateway-iceoryx-" + std::to_string(worker)});
+  ASSERT_EQ(leave.process.wait(), 0);
+  ASSERT_TRUE(gate.hear("RouDi runs but is silent: it has given the gateway up")) << gate.heard;
+  wait_for_another_worker("/Low:o", worker);
+  wait_for_description("/Low:o", "no publisher matched");
 }
 
 TEST_F(Iceoryx, AGatewayIsEndedWhetherRouDiRunsOrNot) {

@@ -33,9 +33,9 @@ class Roudi : public Spoken {
   }
 };
 
-inline Spoken plain_publisher(const std::string& event, int header = 0) {
-  Spoken publisher(
-      {ARBITER_TESTS "/plain_iceoryx_publisher", "Test", "One", event, std::to_string(header)});
+inline Spoken plain_publisher(const std::string& event, int header = 0, int history = 0) {
+  Spoken publisher({ARBITER_TESTS "/plain_iceoryx_publisher", "Test", "One", event,
+                    std::to_string(header), std::to_string(history)});
   EXPECT_TRUE(publisher.hear("ready")) << publisher.heard;
   return publisher;
 }
