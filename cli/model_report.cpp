@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/why_report.hpp"
+#include "shm/utf8.hpp"
 
 namespace arbiter::cli {
 namespace {
@@ -20,6 +21,16 @@ json or_null(const std::optional<std::string>& text) { return text ? json(*text)
 std::string how_text(const ModelInForce& model) {
   if (!model.how()) return "";
   return " (" + *model.how() + (model.by() ? ", by " + *model.by() : "") + ')';
+}
+
+std::string news_text(const evidence::ModelChange& model) {
+  std::string text =
+      model.generation == 0 ? "no model" : "model " + std::to_string(model.generation);
+  if (!model.name.empty()) text += " \"" + shm::printable(model.name) + '"';
+  text += model.generation == 0 ? " was in force any more" : " came into force";
+  if (model.how.empty()) return text;
+  const std::string by = model.by.empty() ? "" : ", by " + shm::printable(model.by);
+  return text + " (" + shm::printable(model.how) + by + ')';
 }
 
 std::string origin_text(const ModelInForce& model, shm::Nanoseconds now) {

@@ -78,9 +78,9 @@ std::string since_first(const Recorded& recorded, shm::Nanoseconds time) {
 std::string wall_text(const Recorded& recorded, shm::Nanoseconds time) {
   const std::time_t seconds = (time + recorded.about.wall_offset) / 1'000'000'000;
   std::tm parts{};
-  gmtime_r(&seconds, &parts);
+  localtime_r(&seconds, &parts);
   char text[64];
-  std::strftime(text, sizeof text, "%Y-%m-%d %H:%M:%S UTC", &parts);
+  std::strftime(text, sizeof text, "%Y-%m-%d %H:%M:%S %Z", &parts);
   return text;
 }
 

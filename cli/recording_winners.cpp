@@ -17,6 +17,7 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/live.hpp"
+#include "cli/model_report.hpp"
 #include "cli/port_patterns.hpp"
 #include "cli/recorded_components.hpp"
 #include "cli/recording_part.hpp"
@@ -175,6 +176,13 @@ ordered_json death_json(const evidence::PortChange* death) {
   return {{"node", death->node}, {"pid", death->pid}, {"at_ns", death->seen}};
 }
 
+std::string new_model_text(const Reign& reign) {
+  const auto& models = reign.run->models;
+  const auto model = models.find(reign.change.generation);
+  if (model != models.end()) return news_text(model->second);
+  return "model " + std::to_string(reign.change.generation) + " came into force";
+}
+
 std::string cause_text(const Reign& reign, const Gaps& gaps, shm::Nanoseconds offset) {
   const evidence::WinnerChange& change = reign.change;
   const std::string by = shm::printable(change.by);
@@ -189,7 +197,7 @@ std::string cause_text(const Reign& reign, const Gaps& gaps, shm::Nanoseconds of
     case evidence::WinnerChange::Why::deactivation:
       return by + " was deactivated";
     case evidence::WinnerChange::Why::model:
-      return "model " + std::to_string(change.generation) + " came into force";
+      return new_model_text(reign);
     case evidence::WinnerChange::Why::state:
       break;
   }

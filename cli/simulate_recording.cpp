@@ -86,10 +86,23 @@ ordered_json to_json(const Recorded& recorded, const evidence::LiveDecision& liv
           {"generation", arrival.generation}};
 }
 
+bool had_open_input(const Recorded& recorded) {
+  using What = evidence::PortChange::What;
+  const auto opens = [](const evidence::PortChange& each) {
+    return each.what == What::open || each.what == What::opened;
+  };
+  return std::any_of(recorded.runs.begin(), recorded.runs.end(), [&](const evidence::Run& run) {
+    return std::any_of(run.port_changes.begin(), run.port_changes.end(), opens);
+  });
+}
+
 // Where there is no decision.
 std::string nothing_to_compare(const Recorded& recorded) {
-  return arrivals_of(recorded) == 0
-             ? "nothing to compare: nothing arrived while it was recorded\n"
+  if (arrivals_of(recorded) == 0) {
+    return "nothing to compare: nothing arrived while it was recorded\n";
+  }
+  return had_open_input(recorded)
+             ? "nothing to compare: what arrived was not connected to an open input port\n"
              : "nothing to compare: no input port was open while it was recorded\n";
 }
 
@@ -142,6 +155,7 @@ void write_json(const Recorded& recorded, const evidence::Comparison& result) {
   ordered_json changed = ordered_json::array();
   for (const auto& each : result.changed) {
     ordered_json one = to_json(recorded, each.live);
+    one["was_connected"] = each.was_connected;
     one["other"] = outcome(!each.live.won);
     one["is_connected"] = each.is_connected;
     changed.push_back(std::move(one));
@@ -216,7 +230,8 @@ void write_changed(const Recorded& recorded, const evidence::Comparison& result,
                 << rules::counted(series.count, "arrival") << numbers_text(series) << " at "
                 << shm::printable(*live.port) << ": ";
     }
-    std::cout << outcome(!live.won) << " instead of " << outcome(live.won)
+    std::cout << outcome(!live.won) << " instead of "
+              << (series.first->was_connected ? outcome(live.won) : "not connected")
               << (series.first->is_connected ? "" : " (not connected)") << '\n';
   }
 }

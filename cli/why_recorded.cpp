@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "cli/model_files.hpp"
+#include "cli/model_report.hpp"
 #include "cli/port_name.hpp"
 #include "cli/recording_compile.hpp"
 #include "cli/recording_times.hpp"
@@ -89,45 +90,64 @@ class Explaining {
 
  private:
   void put_in_force(const evidence::ModelChange& change, shm::Nanoseconds time) {
-    if (tenure_ != nullptr) {
-      tenure_->why.run_out_until(time, std::cout);
-      tenure_->why.tell_repeats(std::cout);
-      has_told_ = has_told_ || tenure_->why.has_told();
-    }
     if (other_ != nullptr && tenure_ != nullptr) return;
-    tenure_.reset();
-    if (other_ == nullptr && change.generation == 0) return;  // no model
-    if (other_ == nullptr && !change.has_texts) {
-      std::cerr << "arbiter: the texts of model " << change.generation
-                << " are not in the recording: what it decided is left out\n";
-      return;
+    const auto last = std::move(tenure_);
+    tenure_ = tenure_of(change, time);
+    if (last != nullptr) {
+      last->why.end_by_model(
+          change, time, [this](const std::string& port) { return has_winner(port); }, std::cout);
+      has_told_ = has_told_ || last->why.has_told();
     }
-    auto model = other_;
-    if (model == nullptr) {
-      model = std::make_shared<const Model>(
-          compile_recorded(evidence::texts_of(change), effort_, rules::Keep::kProvenance));
-      const bool is_first = std::exchange(is_first_, false);
-      if (!is_first) {
-        std::cerr << "arbiter: " << options_.time(time) << ", model " << change.generation
-                  << " comes into force\n";
-      }
-    }
+    if (tenure_ != nullptr) tenure_->why.begin(std::cout);
+  }
+
+  // With what was active. Null: nothing is told of what it decided.
+  std::unique_ptr<Tenure> tenure_of(const evidence::ModelChange& change, shm::Nanoseconds time) {
+    auto model = model_of(change, time);
+    if (model == nullptr) return nullptr;
     // Another model of the recording may have it.
     if (!options_.port.empty() && !has_port(*model)) {
       without_port_ = std::move(model);
-      if (other_ != nullptr) return;
-      std::cerr << "arbiter: model " << change.generation << " has no input port " << options_.port
-                << ": what it decided is left out\n";
-      return;
+      if (other_ == nullptr) {
+        std::cerr << "arbiter: model " << change.generation << " has no input port "
+                  << options_.port << ": what it decided is left out\n";
+      }
+      return nullptr;
     }
     has_port_ = true;
-    tenure_ = std::make_unique<Tenure>(std::move(model), options_);
-    rules::Simulation& simulation = tenure_->simulation;
+    auto tenure = std::make_unique<Tenure>(std::move(model), options_);
+    rules::Simulation& simulation = tenure->simulation;
     for (const auto& [source, word] : words_) {
       if (simulation.knows(source)) simulation.set_activity(simulation.source_id(source), word);
     }
     simulation.advance_to(time);
-    tenure_->why.begin(std::cout);
+    return tenure;
+  }
+
+  // Null: there is none, or it is not known.
+  std::shared_ptr<const Model> model_of(const evidence::ModelChange& change,
+                                        shm::Nanoseconds time) {
+    if (other_ != nullptr) return other_;
+    if (change.generation == 0) return nullptr;
+    if (!change.has_texts) {
+      std::cerr << "arbiter: the texts of model " << change.generation
+                << " are not in the recording: what it decided is left out\n";
+      return nullptr;
+    }
+    auto model = std::make_shared<const Model>(
+        compile_recorded(evidence::texts_of(change), effort_, rules::Keep::kProvenance));
+    const bool is_first = std::exchange(is_first_, false);
+    if (!is_first) {
+      std::cerr << "arbiter: " << options_.time(time) << ", " << news_text(change) << '\n';
+    }
+    return model;
+  }
+
+  [[nodiscard]] bool has_winner(const std::string& port) const {
+    if (tenure_ == nullptr) return false;
+    const auto found = tenure_->simulation.find_port(port);
+    return found && tenure_->simulation.table().is_arbitrated(*found) &&
+           tenure_->simulation.winner_at(*found) != shm::kNone;
   }
 
   [[nodiscard]] bool has_port(const Model& model) const {
@@ -197,8 +217,11 @@ int explain_recording(const SimulateRecordingOptions& options, const std::string
   Explaining explaining(std::move(other), options.effort, std::move(told));
   for (const Run& run : recorded.runs) explaining.explain(run);
   explaining.require_port();
-  if (!options.at.empty() && !options.json && !explaining.has_told()) {
-    std::cout << "nobody won at " << shm::printable(options.at) << ", and nothing happened\n";
+  const bool is_all = options.at.empty() && options.part.is_all();
+  if (!is_all && !options.json && !explaining.has_told()) {
+    std::cout << "nobody won "
+              << (options.at.empty() ? "in that time" : "at " + shm::printable(options.at))
+              << ", and nothing happened\n";
   }
   return 0;
 }

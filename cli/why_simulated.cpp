@@ -5,6 +5,7 @@
 #include <stdexcept>
 #include <string_view>
 
+#include "cli/model_report.hpp"
 #include "cli/port_name.hpp"
 #include "rules/explain/change.hpp"
 #include "rules/explain/tenure.hpp"
@@ -63,6 +64,33 @@ void WhySimulated::end(shm::Nanoseconds time, std::ostream& out) {
   run_out_until(time, out);
   tell_repeats(out);
   if (time >= options_.from) tell_held(out);
+}
+
+void WhySimulated::end_by_model(const evidence::ModelChange& model, shm::Nanoseconds time,
+                                const std::function<bool(const std::string& port)>& has_winner,
+                                std::ostream& out) {
+  run_out_until(time, out);
+  tell_repeats(out);
+  simulation_.advance_to(time);
+  for (shm::PortId port = 0; port < winners_.size(); ++port) {
+    const std::string& name = simulation_.port_name(port);
+    const bool is_wanted = options_.port.empty() || options_.port == name;
+    if (winners_[port] == shm::kNone || !is_wanted || has_winner(name)) continue;
+    const std::string winner = name_of(winners_[port]);
+    if (options_.json) {
+      const json event{{"t_ns", time},         {"port", name},
+                       {"event", "change"},    {"old", winner},
+                       {"winner", nullptr},    {"because", json::array()},
+                       {"old_loses", nullptr}, {"model", model.generation}};
+      tell(port, line_of(event, time), out);
+    } else {
+      tell(port,
+           text_of(time) + "  " + name + "  " + winner + " -> idle  because " + news_text(model) +
+               '\n',
+           out);
+    }
+  }
+  if (time > options_.from) tell_held(out);
 }
 
 std::string WhySimulated::line_of(json event, shm::Nanoseconds time) const {

@@ -15,6 +15,7 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/why_report.hpp"
+#include "evidence/records.hpp"
 #include "rules/explain/explain.hpp"
 #include "rules/explain/simulation.hpp"
 
@@ -64,6 +65,11 @@ class WhySimulated {
   void tell_repeats(std::ostream& out);
   // The same, and what ends by itself until then.
   void end(shm::Nanoseconds time, std::ostream& out);
+  // The same, as another model comes into force: whose winner wins no more, for under that nobody
+  // does at this port.
+  void end_by_model(const evidence::ModelChange& model, shm::Nanoseconds time,
+                    const std::function<bool(const std::string& port)>& has_winner,
+                    std::ostream& out);
   // Whether it has told anything yet.
   [[nodiscard]] bool has_told() const { return has_told_; }
 

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "evidence/cues.hpp"
+#include "evidence/open_inputs.hpp"
 #include "evidence/winner_track.hpp"
 
 namespace arbiter::evidence {
@@ -94,34 +95,82 @@ std::vector<WinnerInterval> differing(const Run& run, const std::vector<WinnerCh
 // Of one run of the recording.
 class Decisions {
  public:
-  Decisions(Judge& other, Comparison& comparison) : other_(other), comparison_(comparison) {}
+  Decisions(const Run& run, Models& models, Judge& other, Comparison& comparison)
+      : run_(run),
+        models_(models),
+        other_(other),
+        comparison_(comparison),
+        open_(run.port_changes) {}
 
-  void take(const LiveDecision& live) {
-    ++comparison_.decisions;
-    Judge::Connection connection{};
-    const Permitted permitted = other_.permitted(*live.run, *live.decision, *live.port, connection);
-    if (live.is_blind || !permitted.is_sure()) {
-      ++comparison_.uncertain;
-      return;
-    }
-    auto& before = before_[{live.decision->context->source, *live.port}];
-    if (permitted.has(live.won)) {
-      ++comparison_.same;
-      before = Before::same;
-      return;
-    }
-    const Before now = live.won ? Before::lost : Before::won;
-    const bool is_connected = connection == Judge::Connection::there;
-    comparison_.changed.push_back({live, is_connected, before == now});
-    before = now;
+  void take(const Decision& decision) {
+    for_each_outcome(run_, decision, [this](const LiveDecision& live) { take_decided(live); });
+    take_newly_connected(decision);
   }
 
  private:
   // What the other model has made of a connection's decision.
   enum class Before : std::uint8_t { same, won, lost };
 
+  void take_decided(const LiveDecision& live) {
+    ++comparison_.decisions;
+    Judge::Connection connection{};
+    const Permitted permitted = other_.permitted(run_, *live.decision, *live.port, connection);
+    if (live.is_blind || !permitted.is_sure()) {
+      ++comparison_.uncertain;
+      return;
+    }
+    if (permitted.has(live.won)) {
+      ++comparison_.same;
+      before(live) = Before::same;
+      return;
+    }
+    change({live, true, connection == Judge::Connection::there});
+  }
+
+  // Nothing was decided where the model of then does not connect the two.
+  void take_newly_connected(const Decision& decision) {
+    const rules::Simulation& simulation = other_.simulation();
+    rules::TraceEvent event;
+    event.at = decision.arrival().time;
+    event.source = decision.context->source;
+    const auto live_model = models_.judge(run_, decision.arrival().generation);
+    if (live_model == nullptr || !simulation.knows(event.source)) return;
+    for (const shm::PortId port : simulation.ports_of(event)) {
+      const std::string& name = simulation.port_name(port);
+      if (live_model->connects(event.source, name) || !other_.connects(event.source, name) ||
+          !is_chosen(run_, name) || !open_.has(event.at, name)) {
+        continue;
+      }
+      const LiveDecision live{&run_, &decision, &name, false, false};
+      Judge::Connection connection{};
+      const Permitted permitted = other_.permitted(run_, decision, name, connection);
+      if (permitted.is_sure() && !permitted.wins) {
+        before(live) = Before::same;
+        continue;
+      }
+      ++comparison_.decisions;
+      if (permitted.is_sure()) {
+        change({live, false, true});
+      } else {
+        ++comparison_.uncertain;
+      }
+    }
+  }
+
+  void change(ChangedDecision changed) {
+    const Before now = changed.live.won ? Before::lost : Before::won;
+    changed.goes_on = std::exchange(before(changed.live), now) == now;
+    comparison_.changed.push_back(changed);
+  }
+  Before& before(const LiveDecision& live) {
+    return before_[{live.decision->context->source, *live.port}];
+  }
+
+  const Run& run_;
+  Models& models_;
   Judge& other_;
   Comparison& comparison_;
+  OpenInputs open_;
   // By source and port. Contexts outlive this.
   std::map<std::pair<std::string_view, std::string_view>, Before> before_;
 };
@@ -156,9 +205,9 @@ Comparison compare(const Recorded& recorded, Models& models, Judge& other,
                    const recording::Watch& watch) {
   Comparison comparison;
   for (const Run& run : recorded.runs) {
-    Decisions decisions(other, comparison);
-    for_each_decision(
-        run, [&](const LiveDecision& live) { decisions.take(live); }, watch);
+    Decisions decisions(run, models, other, comparison);
+    for_each_arrival(
+        run, [&](const Decision& decision) { decisions.take(decision); }, watch);
     auto intervals = differing(run, winners_of(run, models), winners_of(run, other));
     std::move(intervals.begin(), intervals.end(), std::back_inserter(comparison.intervals));
   }

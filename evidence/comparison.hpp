@@ -16,7 +16,8 @@ namespace arbiter::evidence {
 
 struct ChangedDecision {
   LiveDecision live;
-  bool is_connected = true;  // under the other model
+  bool was_connected = true;  // live: else nothing was decided
+  bool is_connected = true;   // under the other model
   // The connection's changed decision before has become the same, and none that is surely
   // unchanged lies between the two.
   bool goes_on = false;
@@ -32,6 +33,8 @@ struct WinnerInterval {
 };
 
 struct Comparison {
+  // The live ones; and of arrivals that the other model alone connects to an open input port, those
+  // that it delivers, or may.
   std::uint64_t decisions = 0;
   std::uint64_t same = 0;
   std::uint64_t uncertain = 0;  // overlapped, behind a gap, or blind

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "evidence/comparison.hpp"
+#include "evidence/open_inputs.hpp"
 #include "evidence/verification.hpp"
 #include "rules/explain/simulation.hpp"
 #include "rules/text/csv.hpp"
@@ -84,31 +85,6 @@ class WinnersByTime {
   std::map<std::string, std::string> winners_;
 };
 
-// Which input ports are open, at times that do not fall. When a port was opened or closed, the
-// recording knows by when the daemon said so.
-class OpenPorts {
- public:
-  explicit OpenPorts(const std::vector<PortChange>& changes) : changes_(changes) {}
-
-  bool has(Nanoseconds time, const std::string& port) {
-    for (; next_ < changes_.size() && changes_[next_].seen <= time; ++next_) {
-      const PortChange& change = changes_[next_];
-      using What = PortChange::What;
-      if (change.what == What::open || change.what == What::opened) {
-        open_.insert(change.port);
-      } else {
-        open_.erase(change.port);
-      }
-    }
-    return open_.contains(port);
-  }
-
- private:
-  const std::vector<PortChange>& changes_;
-  std::size_t next_ = 0;
-  std::set<std::string, std::less<>> open_;
-};
-
 // Writes the rows of the arrivals of a run, which come by time.
 class DecisionRows {
  public:
@@ -156,7 +132,7 @@ class DecisionRows {
   Models& models_;
   std::ostream& out_;
   WinnersByTime winners_;
-  OpenPorts open_;
+  OpenInputs open_;
 };
 
 }  // namespace

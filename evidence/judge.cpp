@@ -66,6 +66,12 @@ ActivityWord Judge::word_of(const std::string& source, const Step& step, Nanosec
   return shm::arrival(step.time, timeout(source));
 }
 
+bool Judge::connects(const std::string& source, const std::string& port) const {
+  const auto id = simulation_.find_port(port);
+  return id && simulation_.knows(source) &&
+         simulation_.table().find(simulation_.source_id(source), *id) != shm::kNone;
+}
+
 // Whether something that was written after `from` may have been seen.
 void Judge::look(const Run& run, Read& read, Nanoseconds from, Nanoseconds to,
                  bool& has_later) const {

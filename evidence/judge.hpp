@@ -64,6 +64,8 @@ class Judge {
   [[nodiscard]] ActivityWord word_of(const std::string& source, const Step& step,
                                      Nanoseconds start) const;
 
+  [[nodiscard]] bool connects(const std::string& source, const std::string& port) const;
+
   enum class Connection : std::uint8_t { there, none };
   // At an input port that the model connects the source with; else nothing can win.
   Permitted permitted(const Run& run, const Decision& decision, const std::string& port,

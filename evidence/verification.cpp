@@ -116,13 +116,19 @@ void for_each_outcome(const Run& run, const Decision& decision,
   }
 }
 
-void for_each_decision(const Run& run, const std::function<void(const LiveDecision&)>& use,
-                       const recording::Watch& watch) {
+void for_each_arrival(const Run& run, const std::function<void(const Decision&)>& use,
+                      const recording::Watch& watch) {
   std::uint64_t done = 0;
   for (const Decision& decision : run.decisions) {
     if (watch) watch(done++, run.decisions.size());
-    if (decision.arrival().time >= run.start) for_each_outcome(run, decision, use);
+    if (decision.arrival().time >= run.start) use(decision);
   }
+}
+
+void for_each_decision(const Run& run, const std::function<void(const LiveDecision&)>& use,
+                       const recording::Watch& watch) {
+  for_each_arrival(
+      run, [&](const Decision& decision) { for_each_outcome(run, decision, use); }, watch);
 }
 
 Verification verify(const Recorded& recorded, Models& models, const recording::Watch& watch) {

@@ -27,7 +27,11 @@ struct LiveDecision {
 // Calls `use` for what was decided of an arrival at chosen ports.
 void for_each_outcome(const Run& run, const Decision& decision,
                       const std::function<void(const LiveDecision&)>& use);
-// The same for all arrivals from the run's start on, by time. `watch` counts arrivals of the run.
+// Calls `use` for each arrival from the run's start on, by time. `watch` counts arrivals of the
+// run.
+void for_each_arrival(const Run& run, const std::function<void(const Decision&)>& use,
+                      const recording::Watch& watch = {});
+// The same for what was decided of it at chosen ports.
 void for_each_decision(const Run& run, const std::function<void(const LiveDecision&)>& use,
                        const recording::Watch& watch = {});
 

@@ -80,6 +80,34 @@ TEST(Comparison, SaysWhereTheOtherModelDoesNotConnect) {
   EXPECT_FALSE(result.changed[0].is_connected);
 }
 
+// Live, nothing was decided about /low while /high had the port alone.
+TEST(Comparison, CountsWhatTheOtherModelAloneConnects) {
+  const std::string alone =
+      "<behaviors timeout='500ns'><arbiter at='/p'><select from='/high'/></arbiter></behaviors>";
+  Incident incident(alone);
+  evidence::PortChange open;
+  open.what = evidence::PortChange::What::opened;
+  open.is_input = true;
+  open.port = "/p";
+  open.seen = 1020;
+  incident.arrive("/low", 1010, 1011, Fate::none);  // the port was not open yet
+  incident.add(open);
+  incident.arrive("/high", 1100, 1101, Fate::accepted);
+  incident.arrive("/low", 1200, 1201, Fate::none);  // /high keeps it out
+  incident.arrive("/low", 1650, 1651, Fate::none);
+  incident.arrive("/low", 1700, 1701, Fate::none);
+  evidence::Recorded recorded;
+  const auto result = compare_with(incident, kOverride, recorded);
+  EXPECT_EQ(result.decisions, 3u);
+  EXPECT_EQ(result.same, 1u);
+  ASSERT_EQ(result.changed.size(), 2u);
+  EXPECT_EQ(result.changed[0].live.decision->arrival().time, 1650);
+  EXPECT_FALSE(result.changed[0].was_connected);
+  EXPECT_FALSE(result.changed[0].goes_on);
+  EXPECT_TRUE(result.changed[1].goes_on);
+  EXPECT_EQ(compare_with(incident, alone, recorded).decisions, 1u);
+}
+
 // A file of 260 KB may have 20 000 models; kept, they took four gigabytes.
 TEST(Comparison, KeepsFewOfTheModelsOfARecording) {
   constexpr int kModels = 100;

@@ -154,6 +154,21 @@ TEST(RecordedWinners, SaysThatAPortIsIdleUntilSomebodyWins) {
             "2 came into force\n");
 }
 
+TEST(RecordedWinners, NamesTheModelThatCameAndWhoPutItInForce) {
+  using Why = evidence::WinnerChange::Why;
+  Incident incident;
+  evidence::ModelChange change;
+  change.time = change.seen = 2'000'000'000;
+  change.generation = 2;
+  change.name = "manual";
+  change.how = "switch";
+  change.by = "node teleop";
+  incident.add(change);
+  incident.add(evidence::WinnerChange{"/p", "/low", "", 2'000'000'000, Why::model, "", 2});
+  EXPECT_THAT(arbiter({"recording", "winners", incident.file(5'000'000'000)}).out,
+              testing::EndsWith(": model 2 \"manual\" came into force (switch, by node teleop)\n"));
+}
+
 // Of /low: a component that is there at the start dies, and another one opens the port, which the
 // recorder sees after the first arrival.
 TEST(RecordedWinners, SaysWhoseTheWinnerWas) {

@@ -289,13 +289,59 @@ TEST(SimulateRecording, TellsWhyByTheModelThatWasInForce) {
   EXPECT_EQ(result.exit_code, 0) << result.err;
   EXPECT_THAT(
       result.err,
-      HasSubstr("arbiter: 1970-01-01 00:00:00.005 (+0.000000200 s), model 2 comes into force\n"));
+      HasSubstr("arbiter: 1970-01-01 00:00:00.005 (+0.000000200 s), model 2 came into force\n"));
   EXPECT_THAT(
       result.out,
       HasSubstr("\n1970-01-01 00:00:00.005 (+0.000000200 s)  /p  /low wins as this begins\n"));
   EXPECT_THAT(
       result.out,
       HasSubstr("\n1970-01-01 00:00:00.005 (+0.000000210 s)  /p  /high discarded: inhibited by "));
+}
+
+// Nobody wins there by the new one: it does not connect who commanded.
+TEST(SimulateRecording, TellsThatAModelEndsACommand) {
+  Incident incident;
+  incident.arrive("/low", 1100, 1101, Incident::Fate::accepted);
+  evidence::ModelChange change;
+  change.time = change.seen = 1300;
+  change.generation = 2;
+  change.name = "hands off";
+  change.how = "switch";
+  change.by = "root";
+  change.has_texts = true;
+  change.files = {
+      {"off.xml", "<behaviors><arbiter at='/p'><select from='/high'/></arbiter></behaviors>"}};
+  incident.add(change);
+  incident.arrive("/low", 1310, 1311, Incident::Fate::none);
+  const std::string file = incident.file(1400);
+  const auto result = in_utc({"simulate", "--recording", file, "--why=/p"});
+  EXPECT_THAT(result.out, testing::EndsWith("(+0.000000200 s)  /p  /low -> idle  because model 2 "
+                                            "\"hands off\" came into force (switch, by root)\n"));
+  const auto lines = in_utc({"simulate", "--recording", file, "--why", "--json"}).out;
+  const json last = json::parse(lines.substr(lines.rfind('\n', lines.size() - 2) + 1));
+  EXPECT_EQ(last["event"], "change");
+  EXPECT_EQ(last["old"], "/low");
+  EXPECT_TRUE(last["winner"].is_null());
+  EXPECT_EQ(last["model"], 2);
+}
+
+TEST(SimulateRecording, SaysThatNothingThatArrivedWasConnected) {
+  Incident incident("<behaviors><arbiter at='/p'><select from='/high'/></arbiter></behaviors>");
+  evidence::PortChange open;
+  open.what = evidence::PortChange::What::open;
+  open.is_input = true;
+  open.port = "/p";
+  open.seen = 1000;
+  incident.add(open);
+  incident.arrive("/low", 1100, 1101, Incident::Fate::none);
+  const std::string file = incident.file();
+  EXPECT_THAT(in_utc({"simulate", "--recording", file}).out,
+              testing::EndsWith("nothing to compare: what arrived was not connected to an open "
+                                "input port\n"));
+  const TemporaryDirectory directory;
+  const std::string other = directory.write("other.xml", kOverride);
+  EXPECT_THAT(in_utc({"simulate", other, "--recording", file}).out,
+              HasSubstr("  /low #1 at /p: delivered instead of not connected\n"));
 }
 
 // The first model need not have the port.
