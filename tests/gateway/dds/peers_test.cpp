@@ -90,5 +90,16 @@ TEST_F(Crowds, ReadersHideNoWriter) {
   test::await([&] { return is_seen(writer); });
 }
 
+// Else a gateway would warn of itself.
+TEST_F(Crowds, OfOurOwnAreNobodyElses) {
+  ddsi_sertype* type = make_opaque_type("T", false);
+  const Entity topic(dds_create_topic_sertype(own_.get(), "t", &type, nullptr, nullptr, nullptr),
+                     "topic");
+  const Entity own(dds_create_writer(own_.get(), topic.get(), nullptr, nullptr), "end");
+  const Entity theirs = end_of(End::kWriter);  // Cyclone tells of it later
+  test::await([&] { return is_seen(theirs); });
+  EXPECT_FALSE(is_seen(own));
+}
+
 }  // namespace
 }  // namespace arbiter::gateway::dds
