@@ -108,6 +108,10 @@ int replay(const ReplayVerb& verb) {
             << rules::counted(replayed.deactivations, "deactivation") << " of "
             << rules::counted(replayed.sources, "source") << " in " << seconds_text(replayed.time)
             << '\n';
+  if (replayed.at_start != 0) {
+    std::cout << "and first " << rules::counted(replayed.at_start, "signal")
+              << ", for who was active as it begins\n";
+  }
   if (replayed.without_payload != 0) {
     std::cout << rules::counted(replayed.without_payload, "sample")
               << " whose payload is not in the recording became signals\n";

@@ -15,6 +15,8 @@ namespace arbiter::importing {
 namespace {
 
 constexpr std::size_t kMaxNameBytes = 128;
+// Nobody has a robot obey its last message for so long.
+constexpr shm::Nanoseconds kLikelyMilliseconds = 50'000'000'000;
 
 // A name becomes a behaviour's: it is seen in messages and logs.
 std::string find_problem_in_name(const std::string& name) {
@@ -117,6 +119,12 @@ class EntryReader {
       return false;
     }
     entry.timeout = {*seconds.value, found->value.where};
+    if (*seconds.value >= kLikelyMilliseconds) {
+      diagnostics_.warning("long-timeout", found->value.where,
+                           "a timeout counts seconds: this is " + in_seconds(*seconds.value) +
+                               ", for which the last message counts; if you mean milliseconds, "
+                               "divide by a thousand");
+    }
     if (rules_.wants_fraction && is_whole(found->value)) {
       diagnostics_.warning("whole-timeout", found->value.where,
                            rules_.program +

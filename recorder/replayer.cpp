@@ -95,9 +95,9 @@ void Replayer::survey() {
   if (!model) return;
   const rules::Simulation simulation(*model);
   for (auto& [name, source] : sources_) {
-    if (simulation.knows(name)) {
-      source.timeout = simulation.table().timeout(simulation.source_id(name));
-    }
+    // One that the model does not name has the model's.
+    const shm::SourceId id = simulation.knows(name) ? simulation.source_id(name) : shm::kNone;
+    source.timeout = simulation.table().timeout(id);
   }
   for (shm::PortId port = 0; port < simulation.port_names().size(); ++port) {
     shm::for_each_heeded(simulation.table(), port, [&](shm::SourceId id) {
@@ -271,6 +271,7 @@ Replayed Replayer::run(const shm::FileDescriptor& interrupts) {
   } catch (const Interrupted&) {
     replayed.was_interrupted = true;
   }
+  replayed.at_start = active_at_start_;
   if (has_begun_) replayed.time = shm::monotonic_now() - start_;
   return replayed;
 }
@@ -319,6 +320,7 @@ void Replayer::signal_active_ones() {
       arrived = first_;
     }
     signal_active(source, arrived);
+    ++active_at_start_;
   }
   if (unknown.empty()) return;
   options_.say("the recording does not have the T of " + rules::enumerate(unknown) +

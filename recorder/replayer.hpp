@@ -44,6 +44,7 @@ struct Replayed {
   std::uint64_t of_another_type = 0;  // than the source's last sample, and so the port: the same
   std::set<std::string> changed{};    // the sources of these
   std::size_t sources = 0;
+  std::uint64_t at_start = 0;  // signals, for who was active as it began
   evidence::Nanoseconds time = 0;
   evidence::Nanoseconds latest = 0;  // how late a call came, at most
   bool was_interrupted = false;
@@ -123,6 +124,7 @@ class Replayer {
   std::optional<Node> node_;
   bool keeps_times_ = false;
   bool has_begun_ = false;
+  std::uint64_t active_at_start_ = 0;
   Nanoseconds start_ = 0;  // of the replay
   Nanoseconds last_ = 0;   // due time
 };

@@ -138,6 +138,9 @@ TEST(TwistMux, WhatIsDangerousIsReportedWithItsLine) {
   EXPECT_THAT(imported.plan->locks, IsEmpty());
   imported = import_mux(topics({"name: a, topic: a, timeout: 1, priority: 1"}));
   EXPECT_THAT(imported.findings(), ElementsAre("2:32 warning whole-timeout"));
+  imported = import_mux(topics({kNavigation}, {"name: l, topic: l, timeout: 500.0, priority: 99"}));
+  EXPECT_THAT(imported.findings(), ElementsAre("4:32 warning long-timeout"));
+  EXPECT_THAT(imported.message("long-timeout"), HasSubstr("this is 500 s, "));
 }
 
 TEST(TwistMux, EqualsAreInTheOrderOfNamesInRos2) {

@@ -122,7 +122,7 @@ TEST_F(PartOfTheTools, IsExported) {
             "28995000010,/low,/p,discarded,/high\n");
 }
 
-// Who was active as it begins arrives first, and is not counted.
+// Who was active as it begins arrives first.
 TEST_F(PartOfTheTools, IsReplayed) {
   Daemon daemon(kLasting);
   Node node("test");
@@ -132,12 +132,29 @@ TEST_F(PartOfTheTools, IsReplayed) {
            {"--from", "00:00:28.5", "--to", "00:00:30"});
   EXPECT_EQ(replayed.exit_code, 0) << replayed.err;
   EXPECT_THAT(replayed.out, HasSubstr("2 samples, 0 signals and 1 deactivation of 2 sources in "));
+  EXPECT_THAT(replayed.out, HasSubstr("\nand first 2 signals, for who was active as it begins\n"));
   const auto taken = in.take();
   ASSERT_TRUE(taken);
   EXPECT_EQ(taken->source(), "/high");
   EXPECT_FALSE(in.take());
   EXPECT_THAT(tool({"replay", file_, "--as-fast-as-possible"}, {"--from", "00:00:50"}).out,
               HasSubstr("10 samples, 0 signals and 0 deactivations of 1 source in "));
+}
+
+// A source that the model of then does not name has its T.
+TEST(ReplayOfAPart, KnowsTheTOfWhomTheModelDoesNotName) {
+  Daemon daemon(kLasting);
+  Incident incident(
+      "<behaviors timeout='2s'><arbiter at='/p'><select from='/high'/></arbiter></behaviors>");
+  incident.arrive("/low", 1'500'000'000, 1'500'000'001, Incident::Fate::none, 2'000'000'000);
+  incident.put_payload(8);
+  incident.arrive("/low", 3'000'000'000, 3'000'000'001, Incident::Fate::none, 2'000'000'000);
+  incident.put_payload(8);
+  const auto replayed =
+      run_program({"/usr/bin/env", "TZ=UTC", ARBITER_PROGRAMS "/arbiter", "replay",
+                   incident.file(4'000'000'000), "--speed", "1000", "--from", "00:00:02"});
+  EXPECT_THAT(replayed.out, HasSubstr("1 sample, 0 signals and 0 deactivations of 1 source in "));
+  EXPECT_THAT(replayed.err, Not(HasSubstr("does not have the T")));
 }
 
 // Of those that are not in it, the nearest.
