@@ -33,47 +33,67 @@ std::optional<std::string_view> quoted_source(std::string_view text) {
 }
 
 // Those that were passed over and may have to be handed on: to read them takes twenty times as
-// long. Of each source the last arrival, and the first deactivation behind it: to deactivate once
-// more changes nothing.
+// long. Of each source, before the part and behind it, the last arrival, and the first deactivation
+// behind that: to deactivate once more changes nothing.
 class PassedEvents {
  public:
-  void put(std::string_view source, RecordKind kind, std::uint64_t number, std::string_view text) {
+  void put(std::string_view source, bool is_behind, PassedEvent event) {
     auto found = of_sources_.find(source);
     if (found == of_sources_.end()) found = of_sources_.emplace(source, OfSource{}).first;
-    auto& [arrival, deactivation] = found->second;
-    if (kind == RecordKind::kArrival) {
-      arrival = {kind, number, std::string(text)};
+    auto& [arrival, deactivation] = is_behind ? found->second.behind : found->second.before;
+    if (event.kind == RecordKind::kArrival) {
+      arrival = std::move(event);
       deactivation.number = 0;
     } else if (deactivation.number == 0) {
-      deactivation = {kind, number, std::string(text)};
+      deactivation = std::move(event);
     }
   }
-  // In the order in which they stand in the file.
-  [[nodiscard]] std::vector<PassedEvent> take() {
+  // Those of one source, or of all, in the order in which they stand in the file.
+  [[nodiscard]] std::vector<PassedEvent> take(std::string_view source) {
     std::vector<PassedEvent> all;
-    for (auto& [source, events] : of_sources_) {
-      for (PassedEvent* const each : {&events.arrival, &events.deactivation}) {
+    const auto found = of_sources_.find(source);
+    if (found == of_sources_.end()) return all;
+    add(found->second, all);
+    of_sources_.erase(found);
+    return sorted(std::move(all));
+  }
+  [[nodiscard]] std::vector<PassedEvent> take_all() {
+    std::vector<PassedEvent> all;
+    for (auto& [source, events] : of_sources_) add(events, all);
+    of_sources_.clear();
+    return sorted(std::move(all));
+  }
+
+ private:
+  struct Side {
+    PassedEvent arrival;
+    PassedEvent deactivation;
+  };
+  struct OfSource {
+    Side before;
+    Side behind;
+  };
+
+  static void add(OfSource& events, std::vector<PassedEvent>& all) {
+    for (Side* const side : {&events.before, &events.behind}) {
+      for (PassedEvent* const each : {&side->arrival, &side->deactivation}) {
         if (each->number != 0) all.push_back(std::move(*each));
       }
     }
-    of_sources_.clear();
+  }
+  static std::vector<PassedEvent> sorted(std::vector<PassedEvent> all) {
     std::sort(all.begin(), all.end(),
               [](const auto& one, const auto& other) { return one.number < other.number; });
     return all;
   }
 
- private:
-  struct OfSource {
-    PassedEvent arrival;
-    PassedEvent deactivation;
-  };
   std::map<std::string, OfSource, std::less<>> of_sources_;
 };
 
 // What is longer is read at once, for of that little is kept: names are shorter.
 constexpr std::size_t kMostKept = 4096;
 
-// Whether what it says of a source may rest on the events before it.
+// Whether what it says of its source, or of all, may rest on the events before it.
 bool rests_on_events(RecordKind kind) {
   return kind != RecordKind::kWinner && kind != RecordKind::kPort && kind != RecordKind::kModel;
 }
@@ -95,7 +115,7 @@ class Reading {
       take(name, map);
     };
     result_.end = recording::read_mcap(path_, visitor);
-    hand_on_passed();
+    hand_on(passed_.take_all());
     hand_on();
     if (!has_metadata_) refuse();
     return std::move(result_);
@@ -171,7 +191,10 @@ class Reading {
       hand_on();
       return;
     }
-    if (rests_on_events(kind->second)) hand_on_passed();
+    if (rests_on_events(kind->second)) {
+      const auto source = quoted_source(text);
+      hand_on(source ? passed_.take(*source) : passed_.take_all());
+    }
     read(kind->second, text, result_.records);
   }
 
@@ -181,9 +204,7 @@ class Reading {
     if (events_.has(time) || text.size() > kMostKept) return false;
     const auto source = quoted_source(text);
     if (!source) return false;
-    const bool is_behind = time >= events_.to;
-    if (std::exchange(is_behind_, is_behind) != is_behind) hand_on_passed();
-    passed_.put(*source, kind, result_.records, text);
+    passed_.put(*source, time >= events_.to, {kind, result_.records, std::string(text)});
     return true;
   }
 
@@ -198,8 +219,8 @@ class Reading {
     }
   }
 
-  void hand_on_passed() {
-    for (const PassedEvent& each : passed_.take()) read(each.kind, each.text, each.number);
+  void hand_on(const std::vector<PassedEvent>& passed) {
+    for (const PassedEvent& each : passed) read(each.kind, each.text, each.number);
   }
 
   // It stands directly behind its arrival.
@@ -231,7 +252,6 @@ class Reading {
   std::optional<Record> waiting_;
   const TimeSpan events_;
   PassedEvents passed_;
-  bool is_behind_ = false;  // the part: those that were passed over last
 };
 
 }  // namespace

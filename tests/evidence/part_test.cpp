@@ -279,6 +279,22 @@ TEST(PartOfARecording, DoesNotKeepLongTexts) {
   EXPECT_EQ(arrivals, (std::map<std::string, int>{{"/long", 3}, {"/low", 1}}));
 }
 
+// Where states are many, as of a source that cannot be tapped, all others are passed over still.
+TEST(PartOfARecording, ReadsOfOthersWhatStatesOfThemRestOn) {
+  Incident incident;
+  for (int i = 0; i < 50; ++i) {
+    incident.arrive("/high", 1100 + 10 * i, 1101 + 10 * i, Fate::accepted);
+    incident.state("/low", 0, 1105 + 10 * i, shm::arrival(1104 + 10 * i, 500));
+  }
+  int arrivals = 0;
+  const auto use = [&](evidence::Record&& record) {
+    arrivals += std::holds_alternative<evidence::Arrival>(record) ? 1 : 0;
+  };
+  evidence::read_recording(incident.file(), evidence::Payloads::pass_over, use, {},
+                           {kLongAfter, shm::kForever});
+  EXPECT_EQ(arrivals, 1);
+}
+
 // Who replays it waits for nothing of what stands behind it.
 TEST(PartOfARecording, IsHandedOnBeforeWhatIsBehindItHasBeenRead) {
   Incident incident;
