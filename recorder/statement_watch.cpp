@@ -83,10 +83,9 @@ void StatementWatch::run() {
       if (is_true && !was_true) came_true_();
       was_true = is_true;
     } catch (const watch::StatementError& error) {  // another model may have its names
-      const std::string reason = reason_of(error);
-      say_once(
-          reason + (reason.ends_with('?') ? " " : "; ") + "--when waits for a model that has it",
-          std::move(moment));
+      const std::string why = reason_of(error);
+      say_once(why + (why.ends_with('?') ? " " : "; ") + "--when waits for a model that has it",
+               std::move(moment));
     } catch (const std::exception& error) {  // there is no model, or the daemon may not be asked
       say_once(error.what(), std::move(moment));
     }
