@@ -184,7 +184,7 @@ TEST_F(Flight, SaysWhichNameOfAStatementTheModelLacks) {
   std::string said;
   await([&] {
     said = content_of(file);
-    return said.find("; --when waits for a model that has it\n") != std::string::npos;
+    return said.find("? --when waits for a model that has it\n") != std::string::npos;
   });
   EXPECT_THAT(said, HasSubstr("gives this condition no meaning: "));
   EXPECT_THAT(said, HasSubstr("/hihg"));
