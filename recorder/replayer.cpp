@@ -289,11 +289,13 @@ void Replayer::deactivate_untold(Nanoseconds recorded, const shm::FileDescriptor
                                  Replayed& replayed) {
   for (; next_untold_ < untold_.size(); ++next_untold_) {
     const evidence::Deactivation& over = untold_[next_untold_];
-    if (over.time > recorded) return;
+    if (over.time > recorded) break;
     if (sources_.count(over.context->source) == 0) continue;
+    renew(over.time, interrupts);
     await(over.time, interrupts);
     publish(over, replayed);
   }
+  renew(recorded, interrupts);
 }
 
 void Replayer::await(Nanoseconds recorded, const shm::FileDescriptor& interrupts) {
@@ -315,17 +317,47 @@ void Replayer::signal_active_ones() {
     if (!shm::is_active(source.at_start, first_)) continue;
     const bool is_forever = !shm::is_finite(source.at_start);
     Nanoseconds arrived = is_forever ? first_ : shm::arrival_of(source.at_start, source.timeout);
-    if (!is_forever && (source.timeout == shm::kForever || arrived > first_)) {
+    if (!is_forever && source.timeout == shm::kForever) {
       unknown.push_back(name);
       arrived = first_;
+    } else if (!is_forever && arrived > first_) {  // T was longer when it arrived
+      plan_renewals(source, std::exchange(arrived, first_));
     }
     signal_active(source, arrived);
     ++active_at_start_;
   }
+  std::stable_sort(renewals_.begin(), renewals_.end(),
+                   [](const Renewal& one, const Renewal& other) { return one.time < other.time; });
   if (unknown.empty()) return;
   options_.say("the recording does not have the T of " + rules::enumerate(unknown) +
                " from before its start: the replay begins with a signal there, and that activity "
                "may last longer than it did");
+}
+
+// So that it ends when it did, unless something is told of it before.
+void Replayer::plan_renewals(Source& source, Nanoseconds last) {
+  constexpr Nanoseconds kMost = 1000;
+  const Nanoseconds step = std::max({source.timeout / 2, (last - first_) / kMost, Nanoseconds{1}});
+  for (Nanoseconds time = first_ + step; time < last; time += step) {
+    renewals_.push_back({time, &source});
+  }
+  renewals_.push_back({last, &source});
+}
+
+// Those until then, but none behind all that happens.
+void Replayer::renew(Nanoseconds recorded, const shm::FileDescriptor& interrupts) {
+  const Nanoseconds until = std::min(recorded, latest_);
+  for (; next_renewal_ < renewals_.size(); ++next_renewal_) {
+    const Renewal& renewal = renewals_[next_renewal_];
+    if (renewal.time > until) return;
+    if (renewal.source->has_told) continue;
+    await(renewal.time, interrupts);
+    if (keeps_times_) {
+      renewal.source->port->signal_at(time_at(last_));
+    } else {
+      renewal.source->port->signal();
+    }
+  }
 }
 
 void Replayer::signal_active(Source& source, Nanoseconds arrived) {
@@ -342,6 +374,7 @@ void Replayer::signal_active(Source& source, Nanoseconds arrived) {
 
 void Replayer::publish(const Record& record, Replayed& replayed) {
   Source& source = sources_.at(evidence::context_of(record)->source);
+  source.has_told = true;
   Nanoseconds at = last_;
   if (source.deactivated == at) at = ++last_;
   Nanoseconds now = shm::monotonic_now();

@@ -86,6 +86,12 @@ class Replayer {
     Nanoseconds timeout = shm::kForever;              // T when it was recorded
     std::optional<OutputPort<void>> port{};
     Nanoseconds deactivated = 0;
+    bool has_told = false;  // it has been published
+  };
+  // Of an activity from before the beginning that lasts for longer than T.
+  struct Renewal {
+    Nanoseconds time = 0;
+    Source* source = nullptr;
   };
 
   void survey();
@@ -102,6 +108,8 @@ class Replayer {
   void begin(const shm::FileDescriptor& interrupts);
   void signal_active_ones();
   void signal_active(Source& source, Nanoseconds arrived);
+  void plan_renewals(Source& source, Nanoseconds last);
+  void renew(Nanoseconds recorded, const shm::FileDescriptor& interrupts);
   void deactivate_untold(Nanoseconds recorded, const shm::FileDescriptor& interrupts,
                          Replayed& replayed);
   void await(Nanoseconds recorded, const shm::FileDescriptor& interrupts);
@@ -116,6 +124,8 @@ class Replayer {
   // Those that the recorder has only seen in the state that they have left, as an operator's.
   std::vector<evidence::Deactivation> untold_;
   std::size_t next_untold_ = 0;
+  std::vector<Renewal> renewals_;
+  std::size_t next_renewal_ = 0;
   Nanoseconds first_ = 0;   // of the recording, or of the part
   Nanoseconds latest_ = 0;  // of its arrivals and deactivations
   // Records. Late news of the part may stand far behind it.

@@ -157,6 +157,29 @@ TEST(ReplayOfAPart, KnowsTheTOfWhomTheModelDoesNotName) {
   EXPECT_THAT(replayed.err, Not(HasSubstr("does not have the T")));
 }
 
+// /high arrived under a T of 10 s, and then T became 1 s: it kept /low out all the time.
+TEST(ReplayOfAPart, GoesOnWithAnActivityThatIsLongerThanT) {
+  const auto with = [](const std::string& timeout) {
+    std::string model = kOverride;
+    return model.replace(model.find("500ns"), 5, timeout);
+  };
+  constexpr shm::Nanoseconds kHalf = kInSecond / 2;
+  Incident incident(with("10s"));
+  incident.arrive("/high", 20 * kHalf, 20 * kHalf, Incident::Fate::accepted, 20 * kHalf);
+  incident.put_in_force(with("1s"), 2, 22 * kHalf);
+  for (int half = 24; half < 32; ++half) {
+    incident.arrive("/low", half * kHalf, half * kHalf, Incident::Fate::discarded, 2 * kHalf);
+    incident.put_payload(8);
+  }
+  Daemon daemon(with("1s"));
+  Node node("test");
+  auto in = node.input_port("/p", {.depth = 16});
+  const auto replayed = run_program({"/usr/bin/env", "TZ=UTC", ARBITER_PROGRAMS "/arbiter",
+                                     "replay", incident.file(40 * kHalf), "--from", "00:00:12"});
+  EXPECT_THAT(replayed.out, HasSubstr("8 samples, 0 signals and 0 deactivations of 2 sources in "));
+  EXPECT_FALSE(in.take()) << replayed.err;
+}
+
 // Of those that are not in it, the nearest.
 TEST_F(PartOfTheTools, BeginsAndEndsOnTheDaysThatFit) {
   EXPECT_THAT(simulated({"--from", "23:59:00", "--to", "00:00:10"}).out,
