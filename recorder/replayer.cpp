@@ -4,16 +4,12 @@
 #include <chrono>
 #include <utility>
 
-#include "evidence/models.hpp"
 #include "evidence/record_reader.hpp"
 #include "recorder/sleep.hpp"
 #include "recorder/speed.hpp"
-#include "rules/model/load.hpp"
 #include "rules/model/quantifiers.hpp"
-#include "rules/prove/compile.hpp"
 #include "rules/text/names.hpp"
 #include "shm/clock.hpp"
-#include "shm/port_picture.hpp"
 
 namespace arbiter::recorder {
 namespace {
@@ -51,137 +47,35 @@ std::string advice_for(const std::string& refusal, const std::string& port) {
 // What `arbiter winners` says of the instance itself counts there, not what it said elsewhere.
 bool is_announcement(const std::string& source) { return source.starts_with("/arbiter/winner/"); }
 
-// By the rule of ports (Type).
-bool have_one_type(const evidence::SourceContext& one, const evidence::SourceContext& other) {
-  if (one.type != other.type) return false;
-  const bool is_variable = one.alignment == 0;
-  return one.type.empty() ||
-         (one.alignment == other.alignment && (is_variable || one.size == other.size));
-}
-
-std::optional<rules::CompiledModel> compiled(const evidence::ModelChange& model) {
-  if (!model.has_texts) return std::nullopt;
-  rules::Diagnostics diagnostics;
-  auto result = rules::compile(rules::load(evidence::texts_of(model), diagnostics), diagnostics);
-  if (diagnostics.has_errors()) return std::nullopt;
-  return result;
-}
-
 }  // namespace
 
-Replayer::Replayer(const ReplayOptions& options) : options_(options) {
-  survey();
+Replayer::Replayer(const ReplayOptions& options)
+    : options_(options), surveyed_(survey(options.file, options.part, options.say, options.watch)) {
   choose();
   if (sources_.empty()) {
     throw NothingChosen(options_.file + " has no arrival of what you have chosen");
   }
   refuse_without_payloads(is_announcement);  // these may be left out
-  if (options_.speed > 0) require_end(options_.file, latest_ - first_, options_.speed);
+  if (options_.speed > 0)
+    require_end(options_.file, surveyed_.latest - surveyed_.first, options_.speed);
   open_ports();
   refuse_without_payloads([](const std::string&) { return false; });
 }
 
-void Replayer::survey() {
-  first_ = options_.part.from;
-  const auto about = evidence::read_recording(
-      options_.file, evidence::Payloads::pass_over, [this](Record&& record) { survey(record); },
-      options_.watch, options_.part);
-  if (!about.end.is_whole) {
-    options_.say(options_.file + ": " + about.end.problem + "; what comes before is published");
-  }
-  std::stable_sort(untold_.begin(), untold_.end(),
-                   [](const auto& one, const auto& other) { return one.time < other.time; });
-  const auto model = model_ ? compiled(*model_) : std::nullopt;
-  if (!model) return;
-  const rules::Simulation simulation(*model);
-  for (auto& [name, source] : sources_) {
-    // One that the model does not name has the model's.
-    const shm::SourceId id = simulation.knows(name) ? simulation.source_id(name) : shm::kNone;
-    source.timeout = simulation.table().timeout(id);
-  }
-  for (shm::PortId port = 0; port < simulation.port_names().size(); ++port) {
-    shm::for_each_heeded(simulation.table(), port, [&](shm::SourceId id) {
-      sources_of_ports_[simulation.port_name(port)].insert(simulation.source_name(id));
-    });
-  }
-}
-
-void Replayer::survey(const Record& record) {
-  ++surveyed_;
-  if (const auto* start = std::get_if<evidence::Start>(&record)) {
-    if (first_ == 0) first_ = start->time;
-    if (start->time <= options_.part.from) forget_who_was_active();
-  } else if (const auto* model = std::get_if<evidence::ModelChange>(&record)) {
-    if (!model_ || model->time <= options_.part.from) model_ = *model;
-  }
-  const auto* context = evidence::context_of(record);
-  if (context == nullptr) return;
-  Source& source = sources_[context->source];
-  const auto* arrival = std::get_if<Arrival>(&record);
-  const bool has_payload = arrival != nullptr && arrival->has_payload;
-  // That of its last payload; if it has none, the last that was told.
-  const bool tells_type = context->size != 0 && (has_payload || source.payloads == 0);
-  if (tells_type && !have_one_type(source.type, *context)) {
-    source.type = *context;
-  } else if (tells_type) {
-    source.type.size = std::max(source.type.size, context->size);
-  }
-  for (const std::string& port : context->destinations) {
-    sources_of_ports_[port].insert(context->source);
-  }
-  if (arrival != nullptr) {
-    note_event(source, arrival->time, arrival->word);
-    if (!options_.part.has(arrival->time)) return;
-    source.samples += arrival->is_sample ? 1 : 0;
-    source.payloads += has_payload ? 1 : 0;
-    source.largest = std::max(source.largest, arrival->size);
-  } else if (const auto* over = std::get_if<evidence::Deactivation>(&record)) {
-    note_event(source, over->time, shm::deactivated(source.word, over->time));
-  } else if (const auto* state = std::get_if<evidence::SourceState>(&record)) {
-    survey(*state, source);
-  }
-}
-
-// Another daemon, with memory of its own, does not know it.
-void Replayer::forget_who_was_active() {
-  for (auto& [name, source] : sources_) source.word = source.at_start = shm::kNeverActive;
-}
-
-// What was before the part is how it is as that begins.
-void Replayer::note_event(Source& source, Nanoseconds time, evidence::ActivityWord word) {
-  source.word = word;
-  if (time < options_.part.from) {
-    source.at_start = word;
-  } else if (options_.part.has(time)) {
-    source.has_events = true;
-    latest_ = std::max(latest_, time);
-    last_event_ = surveyed_;
-  }
-}
-
-void Replayer::survey(const evidence::SourceState& state, Source& source) {
-  const auto before = std::exchange(source.word, state.word);
-  if (!source.has_events && state.seen <= first_) source.at_start = state.word;
-  if (before == state.word || !shm::is_deactivation(state.word)) return;
-  const Nanoseconds time = shm::time_of(state.word, shm::kForever);
-  if (time <= first_ || time > state.seen || !options_.part.has(time)) return;
-  source.has_events = true;
-  latest_ = std::max(latest_, time);
-  untold_.push_back({state.context, time, state.seen, state.sequence, state.generation});
-}
-
 void Replayer::choose() {
-  std::erase_if(sources_, [this](const auto& each) {
-    const Source& source = each.second;
-    const bool was_active = shm::is_active(source.at_start, first_);
-    return (!source.has_events && !was_active) || !fits(options_.sources, each.first) ||
-           !is_at_chosen_port(each.first);
-  });
+  for (const auto& [name, source] : surveyed_.sources) {
+    const bool has_something =
+        source.has_events || shm::is_active(source.at_start, surveyed_.first);
+    if (has_something && fits(options_.sources, name) && is_at_chosen_port(name)) {
+      sources_.emplace(name, Source{source});
+    }
+  }
 }
 
 bool Replayer::is_at_chosen_port(const std::string& source) const {
   if (options_.ports.empty()) return true;
-  return std::any_of(sources_of_ports_.begin(), sources_of_ports_.end(), [&](const auto& each) {
+  const auto& ports = surveyed_.sources_of_ports;
+  return std::any_of(ports.begin(), ports.end(), [&](const auto& each) {
     return each.second.contains(source) && fits(options_.ports, each.first);
   });
 }
@@ -259,7 +153,7 @@ Replayed Replayer::run(const shm::FileDescriptor& interrupts) {
       await(time, interrupts);
       publish(record, replayed);
     }
-    if (++read >= last_event_) throw Past();
+    if (++read >= surveyed_.last_event) throw Past();
   };
   try {
     try {
@@ -287,8 +181,8 @@ void Replayer::begin(const shm::FileDescriptor& interrupts) {
 // Those that came before that time.
 void Replayer::deactivate_untold(Nanoseconds recorded, const shm::FileDescriptor& interrupts,
                                  Replayed& replayed) {
-  for (; next_untold_ < untold_.size(); ++next_untold_) {
-    const evidence::Deactivation& over = untold_[next_untold_];
+  for (; next_untold_ < surveyed_.untold.size(); ++next_untold_) {
+    const evidence::Deactivation& over = surveyed_.untold[next_untold_];
     if (over.time > recorded) break;
     if (sources_.count(over.context->source) == 0) continue;
     renew(over.time, interrupts);
@@ -306,7 +200,7 @@ void Replayer::await(Nanoseconds recorded, const shm::FileDescriptor& interrupts
 // Never backwards.
 Nanoseconds Replayer::due(Nanoseconds recorded) const {
   if (options_.speed <= 0) return last_;
-  return std::max(last_, start_ + at_speed(recorded - first_, options_.speed));
+  return std::max(last_, start_ + at_speed(recorded - surveyed_.first, options_.speed));
 }
 
 // A recording begins in the middle of activities. Those that end by themselves end when they did;
@@ -314,14 +208,15 @@ Nanoseconds Replayer::due(Nanoseconds recorded) const {
 void Replayer::signal_active_ones() {
   std::vector<std::string> unknown;
   for (auto& [name, source] : sources_) {
-    if (!shm::is_active(source.at_start, first_)) continue;
+    if (!shm::is_active(source.at_start, surveyed_.first)) continue;
     const bool is_forever = !shm::is_finite(source.at_start);
-    Nanoseconds arrived = is_forever ? first_ : shm::arrival_of(source.at_start, source.timeout);
+    Nanoseconds arrived =
+        is_forever ? surveyed_.first : shm::arrival_of(source.at_start, source.timeout);
     if (!is_forever && source.timeout == shm::kForever) {
       unknown.push_back(name);
-      arrived = first_;
-    } else if (!is_forever && arrived > first_) {  // T was longer when it arrived
-      plan_renewals(source, std::exchange(arrived, first_));
+      arrived = surveyed_.first;
+    } else if (!is_forever && arrived > surveyed_.first) {  // T was longer when it arrived
+      plan_renewals(source, std::exchange(arrived, surveyed_.first));
     }
     signal_active(source, arrived);
     ++active_at_start_;
@@ -337,8 +232,9 @@ void Replayer::signal_active_ones() {
 // So that it ends when it did, unless something is told of it before.
 void Replayer::plan_renewals(Source& source, Nanoseconds last) {
   constexpr Nanoseconds kMost = 1000;
-  const Nanoseconds step = std::max({source.timeout / 2, (last - first_) / kMost, Nanoseconds{1}});
-  for (Nanoseconds time = first_ + step; time < last; time += step) {
+  const Nanoseconds step =
+      std::max({source.timeout / 2, (last - surveyed_.first) / kMost, Nanoseconds{1}});
+  for (Nanoseconds time = surveyed_.first + step; time < last; time += step) {
     renewals_.push_back({time, &source});
   }
   renewals_.push_back({last, &source});
@@ -346,7 +242,7 @@ void Replayer::plan_renewals(Source& source, Nanoseconds last) {
 
 // Those until then, but none behind all that happens.
 void Replayer::renew(Nanoseconds recorded, const shm::FileDescriptor& interrupts) {
-  const Nanoseconds until = std::min(recorded, latest_);
+  const Nanoseconds until = std::min(recorded, surveyed_.latest);
   for (; next_renewal_ < renewals_.size(); ++next_renewal_) {
     const Renewal& renewal = renewals_[next_renewal_];
     if (renewal.time > until) return;
@@ -363,7 +259,7 @@ void Replayer::renew(Nanoseconds recorded, const shm::FileDescriptor& interrupts
 void Replayer::signal_active(Source& source, Nanoseconds arrived) {
   try {
     if (keeps_times_ && options_.speed == 1) {
-      source.port->signal_at(time_at(start_ - (first_ - arrived)));
+      source.port->signal_at(time_at(start_ - (surveyed_.first - arrived)));
       return;
     }
   } catch (const Error&) {  // somebody had the source meanwhile

@@ -17,6 +17,7 @@
 #include <arbiter/arbiter.hpp>
 
 #include "evidence/records.hpp"
+#include "recorder/survey.hpp"
 #include "recording/mcap.hpp"
 #include "shm/file_descriptor.hpp"
 
@@ -75,15 +76,7 @@ class Replayer {
  private:
   using Nanoseconds = evidence::Nanoseconds;
 
-  struct Source {
-    evidence::SourceContext type;  // its port's; of it, nothing else counts
-    std::uint64_t largest = 1;     // sample
-    std::uint64_t samples = 0;
-    std::uint64_t payloads = 0;
-    bool has_events = false;
-    evidence::ActivityWord at_start = shm::kNeverActive;
-    evidence::ActivityWord word = shm::kNeverActive;  // after what has been surveyed
-    Nanoseconds timeout = shm::kForever;              // T when it was recorded
+  struct Source : SurveyedSource {
     std::optional<OutputPort<void>> port{};
     Nanoseconds deactivated = 0;
     bool has_told = false;  // it has been published
@@ -94,11 +87,6 @@ class Replayer {
     Source* source = nullptr;
   };
 
-  void survey();
-  void survey(const evidence::Record& record);
-  void survey(const evidence::SourceState& state, Source& source);
-  void forget_who_was_active();
-  void note_event(Source& source, Nanoseconds time, evidence::ActivityWord word);
   void choose();
   [[nodiscard]] bool is_at_chosen_port(const std::string& source) const;
   using Excepted = std::function<bool(const std::string& source)>;
@@ -118,19 +106,11 @@ class Replayer {
   [[nodiscard]] Nanoseconds due(Nanoseconds recorded) const;
 
   const ReplayOptions& options_;
-  std::map<std::string, Source> sources_;
-  std::map<std::string, std::set<std::string>> sources_of_ports_;
-  std::optional<evidence::ModelChange> model_;  // in force at first
-  // Those that the recorder has only seen in the state that they have left, as an operator's.
-  std::vector<evidence::Deactivation> untold_;
+  const Survey surveyed_;
+  std::map<std::string, Source> sources_;  // those that are chosen
   std::size_t next_untold_ = 0;
   std::vector<Renewal> renewals_;
   std::size_t next_renewal_ = 0;
-  Nanoseconds first_ = 0;   // of the recording, or of the part
-  Nanoseconds latest_ = 0;  // of its arrivals and deactivations
-  // Records. Late news of the part may stand far behind it.
-  std::uint64_t surveyed_ = 0;
-  std::uint64_t last_event_ = 0;  // the number of the last that is of the part
   std::optional<Node> node_;
   bool keeps_times_ = false;
   bool has_begun_ = false;
