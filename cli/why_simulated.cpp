@@ -84,10 +84,9 @@ void WhySimulated::end_by_model(const evidence::ModelChange& model, shm::Nanosec
                        {"old_loses", nullptr}, {"model", model.generation}};
       tell(port, line_of(event, time), out);
     } else {
-      tell(port,
-           text_of(time) + "  " + name + "  " + winner + " -> idle  because " + news_text(model) +
-               '\n',
-           out);
+      std::string line = text_of(time) + "  " + name + "  ";
+      line += winner + " -> idle  because " + news_text(model) + '\n';
+      tell(port, std::move(line), out);
     }
   }
   if (time > options_.from) tell_held(out);
