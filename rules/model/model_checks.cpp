@@ -217,7 +217,7 @@ class MeantEnds {
   }
 
   std::string advise(const std::string& source, const std::string& port) {
-    const std::string advice = "add it there, or correct the names here";
+    std::string advice = "add it there, or correct the names here";
     if (++asked_ > kMaxSuggestions) return advice;
     const auto reversed = sources_at_.find(source);
     if (reversed != sources_at_.end() && std::find(reversed->second.begin(), reversed->second.end(),
