@@ -9,6 +9,7 @@
 
 #include "tests/cli/arbiter_program.hpp"
 #include "tests/evidence/incident.hpp"
+#include "tests/recorder/in_zone.hpp"
 #include "tests/support/text_files.hpp"
 
 namespace arbiter::test {
@@ -103,10 +104,9 @@ TEST(RecordedWinners, SaysWhoCommandedAtATimeOfTheClock) {
   incident.arrive("/low", 4000 * kMs, 4000 * kMs, Incident::Fate::accepted);
   const std::string file = incident.file();
   const auto winners = [&](const std::vector<std::string>& more) {
-    std::vector<std::string> arguments{"/usr/bin/env", "TZ=UTC",  ARBITER_PROGRAMS "/arbiter",
-                                       "recording",    "winners", file};
+    std::vector<std::string> arguments{"recording", "winners", file};
     arguments.insert(arguments.end(), more.begin(), more.end());
-    return run_program(arguments);
+    return arbiter_in_utc(arguments);
   };
   const std::string low = "1970-01-01 00:00:01.005  /p  /low  for 1.500 s: /low arrived\n";
   const std::string high = "1970-01-01 00:00:02.505  /p  /high  for 0.200 s: /high arrived\n";
@@ -144,8 +144,7 @@ TEST(RecordedWinners, SaysThatAPortIsIdleUntilSomebodyWins) {
   Incident incident;
   incident.add(evidence::WinnerChange{"/p", "/low", "", 2'000'000'000, Why::arrival, "/low", 1});
   incident.add(evidence::WinnerChange{"/q", "/low", "", 2'000'000'000, Why::model, "", 2});
-  const auto result = run_program({"/usr/bin/env", "TZ=UTC", ARBITER_PROGRAMS "/arbiter",
-                                   "recording", "winners", incident.file(5'000'000'000)});
+  const auto result = arbiter_in_utc({"recording", "winners", incident.file(5'000'000'000)});
   EXPECT_EQ(result.out,
             "1970-01-01 00:00:00.005  /p  idle  for 2.000 s: it was so when the recording began\n"
             "1970-01-01 00:00:02.005  /p  /low  for 3.000 s, until the end of the recording: /low "

@@ -8,6 +8,7 @@
 #include <arbiter/arbiter.hpp>
 
 #include "tests/evidence/incident.hpp"
+#include "tests/recorder/in_zone.hpp"
 #include "tests/recorder/recording.hpp"
 #include "tests/support/temporary_directory.hpp"
 
@@ -53,10 +54,8 @@ class PartOfTheTools : public testing::Test {
   [[nodiscard]] ProgramResult tool(std::vector<std::string> arguments,
                                    const std::vector<std::string>& part,
                                    const std::string& zone = "UTC") const {
-    arguments.insert(arguments.begin(),
-                     {"/usr/bin/env", "TZ=" + zone, ARBITER_PROGRAMS "/arbiter"});
     arguments.insert(arguments.end(), part.begin(), part.end());
-    return run_program(arguments);
+    return arbiter_in(zone, std::move(arguments));
   }
   [[nodiscard]] ProgramResult simulated(const std::vector<std::string>& part) const {
     return tool({"simulate", "--recording", file_}, part);
@@ -150,9 +149,8 @@ TEST(ReplayOfAPart, KnowsTheTOfWhomTheModelDoesNotName) {
   incident.put_payload(8);
   incident.arrive("/low", 3'000'000'000, 3'000'000'001, Incident::Fate::none, 2'000'000'000);
   incident.put_payload(8);
-  const auto replayed =
-      run_program({"/usr/bin/env", "TZ=UTC", ARBITER_PROGRAMS "/arbiter", "replay",
-                   incident.file(4'000'000'000), "--speed", "1000", "--from", "00:00:02"});
+  const auto replayed = arbiter_in_utc(
+      {"replay", incident.file(4'000'000'000), "--speed", "1000", "--from", "00:00:02"});
   EXPECT_THAT(replayed.out, HasSubstr("1 sample, 0 signals and 0 deactivations of 1 source in "));
   EXPECT_THAT(replayed.err, Not(HasSubstr("does not have the T")));
 }
@@ -174,8 +172,7 @@ TEST(ReplayOfAPart, GoesOnWithAnActivityThatIsLongerThanT) {
   Daemon daemon(with("1s"));
   Node node("test");
   auto in = node.input_port("/p", {.depth = 16});
-  const auto replayed = run_program({"/usr/bin/env", "TZ=UTC", ARBITER_PROGRAMS "/arbiter",
-                                     "replay", incident.file(40 * kHalf), "--from", "00:00:12"});
+  const auto replayed = arbiter_in_utc({"replay", incident.file(40 * kHalf), "--from", "00:00:12"});
   EXPECT_THAT(replayed.out, HasSubstr("8 samples, 0 signals and 0 deactivations of 2 sources in "));
   EXPECT_FALSE(in.take()) << replayed.err;
 }
@@ -186,7 +183,7 @@ TEST_F(PartOfTheTools, BeginsAndEndsOnTheDaysThatFit) {
               HasSubstr("\n9 decisions: 9 equal,"));
   // There the day ends in the middle of the recording.
   const auto expect = [&](const std::vector<std::string>& part, const std::string& text) {
-    const auto result = tool({"simulate", "--recording", file_}, part, "XXX-23:59:30");
+    const auto result = tool({"simulate", "--recording", file_}, part, "LATE-23:59:30");
     EXPECT_THAT(result.out + result.err, HasSubstr(text));
   };
   expect({"--from", "23:59:50", "--to", "00:00:10"}, "\n30 decisions: 30 equal,");
@@ -197,9 +194,8 @@ TEST_F(PartOfTheTools, BeginsAndEndsOnTheDaysThatFit) {
 
 ProgramResult replayed_from_1_to_3(const std::string& file) {
   Daemon daemon(kLasting);
-  return run_program({"/usr/bin/env", "TZ=UTC", ARBITER_PROGRAMS "/arbiter", "replay", file,
-                      "--as-fast-as-possible", "--instance", daemon.instance(), "--from",
-                      "00:00:01", "--to", "00:00:03"});
+  return arbiter_in_utc({"replay", file, "--as-fast-as-possible", "--instance", daemon.instance(),
+                         "--from", "00:00:01", "--to", "00:00:03"});
 }
 
 // Its publisher was stopped for long before it could tell of it.

@@ -8,6 +8,7 @@
 
 #include "evidence/record_writer.hpp"
 #include "tests/cli/arbiter_program.hpp"
+#include "tests/recorder/in_zone.hpp"
 #include "tests/support/temporary_directory.hpp"
 #include "tests/support/text_files.hpp"
 
@@ -61,11 +62,9 @@ class RecordedSample : public testing::Test {
   }
 
   ProgramResult sample(const std::string& source, const std::vector<std::string>& more = {}) {
-    std::vector<std::string> arguments{"/usr/bin/env", "TZ=UTC", ARBITER_PROGRAMS "/arbiter",
-                                       "recording",    "sample", file_,
-                                       "--source",     source};
+    std::vector<std::string> arguments{"recording", "sample", file_, "--source", source};
     arguments.insert(arguments.end(), more.begin(), more.end());
-    return run_program(arguments);
+    return arbiter_in_utc(arguments);
   }
   void expect_refusal(const ProgramResult& result, const std::string& why) {
     EXPECT_EQ(result.exit_code, 2);
